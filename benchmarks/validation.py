@@ -5,6 +5,8 @@ DIR is the folder to write to; default: the docs of this checkout. Tests use `ca
 
 from __future__ import annotations
 
+import csv
+import io
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,17 +17,31 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from quick import docs_folder, installed, parser, pick
+from quick import QUICK, docs_folder, installed, parser, pick
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests")]  # closed forms are those of the tests
 
 import devices  # noqa: E402
+import external  # noqa: E402
 from drawing import MILLI, Array, closed_form  # noqa: E402
 from reference import friction_laws as law_reference  # noqa: E402
 from results_page import TABLE_42, closed_transitions, row, table  # noqa: E402
 
-from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top, load_scene, simulate  # noqa: E402
+from msfp_gen import (  # noqa: E402
+    Bearing,
+    Body,
+    Effects,
+    Layout,
+    Motion,
+    Scene,
+    Solver,
+    Surface,
+    Top,
+    __version__,
+    load_scene,
+    simulate,
+)
 from msfp_gen.common.output import replacing  # noqa: E402
 from msfp_gen.result import Result  # noqa: E402
 from msfp_gen.scene.friction_parameters import coefficient  # noqa: E402
@@ -38,6 +54,9 @@ PERIODIC = (*(f"fenz-test{number}" for number in range(1, 6)), "unusual-tfp")
 OPENSEES_SCENES = ("fenz-test2", "fenz-test3", "becker-circle-50", "becker-eight-125")
 STEPS = pick(8000, 500)  # of OpenSees in a run
 SCRIPT = "python benchmarks/validation.py"
+RESULTS = ROOT / "benchmarks" / "results"
+POINTS, HISTORY = RESULTS / "comparisons.csv", RESULTS / "validation.csv"
+SERIES_HEAD = ("case", "compared with", "kind", "quantity", "within", "tolerance", "largest", "RMS")
 
 
 class Case(NamedTuple):
@@ -212,6 +231,53 @@ def programs() -> Iterator[Case]:
         yield Case(case, source, "program", quantity, reference, ours, 4, SCRIPT)
 
 
+def series(opensees: bool = True) -> list[external.Series]:
+    """Comparisons point by point; without those of OpenSees where it is not to be run."""
+    found = list(external.here())
+    if opensees:
+        scenes = [manual_scene(), *(load_scene(name) for name in OPENSEES_SCENES)]
+        found += [*external.opensees_single(), *external.opensees_triple(scenes, STEPS)]
+    return found
+
+
+def series_line(found: external.Series) -> str:
+    """One row of the table of series."""
+    off, limit = np.abs(found.differences), external.TOLERANCE[found.kind]
+    rms = float(np.sqrt(np.mean(off**2)))
+    inside = f"{found.within} of {len(off)}"
+    return row(
+        found.name, found.source, found.kind, found.quantity, inside, f"{limit:.0%}", f"{off.max():.2%}", f"{rms:.2%}"
+    )
+
+
+def points(rows: list[Case], found: list[external.Series]) -> str:
+    """Every comparison as CSV: of the rows, and of the series. The difference is a share of the scale."""
+    out = io.StringIO()
+    write = csv.writer(out, lineterminator="\n")
+    write.writerow(("case", "source", "kind", "quantity", "at", "reference", "ours", "difference", "tolerance"))
+    for one in rows:
+        limit = external.TOLERANCE[one.kind]
+        numbers = (f"{one.reference:.6g}", f"{one.ours:.6g}", f"{one.difference:.2e}", limit)
+        write.writerow((one.case.strip("`"), one.source, one.kind, one.quantity, "", *numbers))
+    for many in found:
+        for point, off in zip(many.points, many.differences, strict=True):
+            numbers = (f"{point.reference:.6g}", f"{point.ours:.6g}", f"{off:.2e}", external.TOLERANCE[many.kind])
+            write.writerow((many.name, many.source, many.kind, many.quantity, point.at, *numbers))
+    return out.getvalue()
+
+
+def history(text: str) -> list[dict[str, str]]:
+    """Rows of `HISTORY`, the one of this version from the comparisons `text`: number, and within their tolerance."""
+    rows = list(csv.DictReader(HISTORY.read_text(encoding="utf-8").splitlines())) if HISTORY.exists() else []
+    found = list(csv.DictReader(text.splitlines()))
+    now = {"version": __version__, "date": f"{date.today()}", "comparisons": str(len(found))}
+    now["within"] = str(sum(abs(float(one["difference"])) <= float(one["tolerance"]) for one in found))
+    for kind in external.TOLERANCE:
+        off = [float(one["difference"]) for one in found if one["kind"] == kind]
+        now[f"rms, {kind}"] = f"{np.sqrt(np.mean(np.square(off))):.2%}"
+    return [*(one for one in rows if one["version"] != __version__), now]
+
+
 def line(case: Case) -> str:
     """One row of the table."""
     numbers = [f"{value:.{case.digits}f}" for value in (case.reference, case.ours)]
@@ -225,11 +291,15 @@ def versions() -> str:
     return f"openseespy {metadata.version('openseespy')} ({STEPS} steps in every run; Python {sys.version_info[0]}.{sys.version_info[1]})"
 
 
-def page(rows: list[Case]) -> str:
+def page(rows: list[Case], found: list[external.Series], past: list[dict[str, str]]) -> str:
     """Text of docs/validation.md."""
     text = TEMPLATE.read_text(encoding="utf-8")
     for name, value in {
         "table": table(HEAD, [line(case) for case in rows]),
+        "series": table(SERIES_HEAD, [series_line(one) for one in found]),
+        "history": table(tuple(past[-1]), [row(*one.values()) for one in past]),
+        "count": past[-1]["comparisons"],
+        "within": past[-1]["within"],
         "programs": versions(),
         "date": f"{date.today()}",
     }.items():
@@ -238,9 +308,19 @@ def page(rows: list[Case]) -> str:
 
 
 def main(folder: Path) -> None:
-    text = page(cases())
+    rows, found = cases(), series()
+    text = points(rows, found)
+    past = history(text)
     with replacing(folder / "validation.md") as temporary:
+        temporary.write_text(page(rows, found, past), encoding="utf-8")
+    if QUICK:
+        return
+    with replacing(POINTS) as temporary:
         temporary.write_text(text, encoding="utf-8")
+    with replacing(HISTORY) as temporary, temporary.open("w", encoding="utf-8") as file:
+        write = csv.DictWriter(file, list(past[-1]), lineterminator="\n")
+        write.writeheader()
+        write.writerows(past)
 
 
 if __name__ == "__main__":
@@ -251,4 +331,4 @@ if __name__ == "__main__":
         main(given.folder)
 
 
-__all__ = ["Array", "Case", "cases", "line", "main", "page"]
+__all__ = ["Array", "Case", "cases", "line", "main", "page", "series", "series_line"]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import re
+from collections import Counter
 
+import external
 import pytest
 import validation
 from support import ROOT
@@ -16,7 +19,7 @@ KINDS = {"experiment", "model", "program", "formula", "closed form"}
 
 def rows() -> list[list[str]]:
     """Cells of the rows of the table."""
-    table = PAGE.split("| --- |", 1)[1].split("\n\n", 1)[0]
+    table = PAGE.split("## Single numbers", 1)[1].split("| --- |", 1)[1].split("\n\n", 1)[0]
     return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in table.splitlines()[1:]]
 
 
@@ -61,3 +64,39 @@ def test_all_rows_but_those_of_other_programs_are_what_runs_give() -> None:
     listed = set(PAGE.splitlines())
     for case in validation.cases(opensees=False):
         assert validation.line(case) in listed
+
+
+def comparisons() -> list[dict[str, str]]:
+    return list(csv.DictReader(validation.POINTS.read_text(encoding="utf-8").splitlines()))
+
+
+def test_every_comparison_has_source_and_tolerance() -> None:
+    """More than a thousand, most of them with other programs; the page states how many, and how many are within."""
+    found = comparisons()
+    for one in found:
+        assert one["source"] and float(one["tolerance"]) == external.TOLERANCE[one["kind"]]
+        assert float(one["reference"]) != 0 or float(one["ours"]) == 0 or one["at"]
+    kinds = Counter(one["kind"] for one in found)
+    assert kinds["program"] > 300 and set(kinds) == set(external.TOLERANCE)
+    within = sum(abs(float(one["difference"])) <= float(one["tolerance"]) for one in found)
+    assert f"{len(found)} comparisons, {within} of them within the tolerance" in PAGE.replace("\n", " ")
+    last = list(csv.DictReader(validation.HISTORY.read_text(encoding="utf-8").splitlines()))[-1]
+    assert (last["comparisons"], last["within"]) == (str(len(found)), str(within)) and within > 0.95 * len(found)
+
+
+def test_tables_of_others_name_their_source() -> None:
+    for path in external.DATA.iterdir():
+        assert re.match(r"# .*\(.*commit [0-9a-f]{12}\)", path.read_text(encoding="utf-8")), path.name
+
+
+@pytest.mark.parametrize("part", ["circle_with_friction", pytest.param("sliding_block", marks=pytest.mark.slow)])
+def test_closed_forms_of_sliding_are_met(part: str) -> None:
+    for series in getattr(external, part)():
+        assert series.within == len(series.points)
+
+
+@pytest.mark.slow
+def test_series_but_those_of_running_programs_are_those_of_the_page() -> None:
+    listed = set(PAGE.splitlines())
+    for series in validation.series(opensees=False):
+        assert validation.series_line(series) in listed

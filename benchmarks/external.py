@@ -1,0 +1,338 @@
+"""Comparisons with tables and formulas of others, point by point: part of `validation.py`.
+
+Tables of other programs are in `data/`, each with its source in the first lines.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import NamedTuple
+
+import devices
+import numpy as np
+from drawing import Array
+from scipy.optimize import brentq
+
+from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top, simulate
+from msfp_gen.scene.scene_fields import InitialState
+from msfp_gen.studies.accuracy.models import run_opensees
+from msfp_gen.studies.accuracy.timed_run import comparison_times
+
+DATA = Path(__file__).with_name("data")
+SLIDER = 0.2  # radius [m] of the bearing of MASTODON
+RADIUS, MU, WEIGHT = 2.2352, 0.06, 6285710.0
+STIFFNESS = 50e6 * np.pi * SLIDER**2 * MU / 1e-3  # of its shear before sliding [N/m]
+
+
+class Point(NamedTuple):
+    """One comparison: where or when, with its unit; the reference; and ours."""
+
+    at: str
+    reference: float
+    ours: float
+
+
+class Series(NamedTuple):
+    """Comparisons of one quantity with one source.
+
+    Attributes:
+        name, source, kind, quantity: as in a row of the page; kind is a key of `TOLERANCE`.
+        points: the comparisons.
+    """
+
+    name: str
+    source: str
+    kind: str
+    quantity: str
+    points: list[Point]
+
+    @property
+    def scale(self) -> float:
+        """The largest reference."""
+        return max(abs(point.reference) for point in self.points)
+
+    @property
+    def differences(self) -> Array:
+        """Ours less the reference, over the scale, shape (points,)."""
+        return np.array([point.ours - point.reference for point in self.points]) / self.scale
+
+    @property
+    def within(self) -> int:
+        """Number of points within the tolerance of the kind."""
+        return int((np.abs(self.differences) <= TOLERANCE[self.kind]).sum())
+
+
+# Largest difference that is expected over the largest reference, by what a reference is worth: never by case.
+TOLERANCE = {"closed form": 0.01, "program": 0.05, "formula": 0.1, "model": 0.15, "experiment": 0.15}
+
+
+def read(name: str) -> dict[str, Array]:
+    """The columns of a table in `data/`."""
+    lines = [line for line in (DATA / name).read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    rows = list(csv.DictReader(lines))
+    return {column: np.array([float(row[column]) for row in rows]) for column in rows[0]}
+
+
+def mastodon_bearing(velocity: bool, pressure: bool, temperature: bool) -> Bearing:
+    """The isolator of MASTODON's tests: a point on the dish. Factors that a test leaves out are one.
+
+    Its stiffness before sliding does not depend on friction; ours is mu N over the yield displacement, with mu at rest.
+    """
+    slow = MU * (0.5 if velocity else 1.0)
+    law = {
+        "pressure_ratio": 0.7 if pressure else 1.0,
+        "velocity_drop": 0.5 if velocity else 0.0,
+        "temperature_ratio": 0.7 if temperature else 1.0,
+        "velocity_rate": 100.0,
+        "reference_pressure": 50e6,
+        "patch_radius": SLIDER,
+        "conductivity": 18.0,
+        "diffusivity": 4.4e-6,
+    }
+    surface = Surface(
+        radius=RADIUS,
+        capacity=1.0,
+        friction=MU,
+        yield_displacement=slow * WEIGHT / (STIFFNESS - WEIGHT / RADIUS),
+        contact_damping=0.0,
+        **law,
+    )
+    body = Body(height=1e-6, centroid=5e-7, mass=1.0, inertia=1e-3)
+    return Bearing(layout=Layout(2, 1, 0), base_height=1e-3, surfaces=[surface], bodies=[body], gravity=9.81)
+
+
+def mastodon_shear() -> Iterator[Series]:
+    """Reaction of the pushed isolator, friction by pressure, velocity, temperature and all three."""
+    given = read("mastodon-shear.csv")
+    time, push = given["time"] - given["time"][0], given["displacement"]
+    motion = Motion.from_arrays(time, np.column_stack([push, 0 * push, 0 * push]))
+    effects = Effects(dimension="planar", sliders="massless", rims=False, bouc_wen="plastic", friction="pvt")
+    for word in ("P", "V", "T", "PTV"):
+        bearing = mastodon_bearing(*(letter in word for letter in "VPT"))
+        scene = Scene(bearing, motion, Top.rig(WEIGHT, 1e12), effects, Solver(rtol=1e-5), output_step=0.005)
+        ours = -simulate(scene).history.top_force[:, 0]
+        rows = range(14, len(time), 6)
+        points = [Point(f"{given['time'][i]:.3f} s", given[word][i], float(ours[i])) for i in rows]
+        name = f"isolator under 6.29 MN pushed at 0.5 Hz, {word}"
+        yield Series(name, "MASTODON, gold table", "program", "force [N]", points)
+
+
+def mastodon_seismic() -> Iterator[Series]:
+    """Reactions along three axes of the isolator below a mass on a base that accelerates."""
+    given = read("mastodon-seismic.csv")
+    time = given["time"] - given["time"][0]
+    ground = np.column_stack([given[f"accel_{axis}"] for axis in "yzx"])
+    motion = Motion.from_acceleration(time, ground)
+    top = Top.mass(640745.0, 1e-3, 0.0)
+    effects = Effects(rims=False, bouc_wen="plastic", friction="pvt")
+    bearing = mastodon_bearing(True, True, True)
+    history = simulate(Scene(bearing, motion, top, effects, Solver(rtol=1e-6), output_step=1e-3)).history
+    for column, axis in enumerate("yzx"):
+        reference, ours = given[f"reaction_{axis}"], history.top_force[:, column]
+        points = [Point(f"{given['time'][i]:.3f} s", reference[i], float(ours[i])) for i in range(5, len(time))]
+        name = f"isolator below 641 t, three axes, {axis}"
+        yield Series(name, "MASTODON, gold table", "program", "force [N]", points)
+
+
+def point_on_a_dish(radius: float, friction: float, capacity: float, yielding: float = 1e-5) -> Bearing:
+    """A slider without extent: its mass is on the sphere."""
+    surface = Surface(
+        radius=radius, capacity=capacity, friction=friction, yield_displacement=yielding, contact_damping=1e-4
+    )
+    body = Body(height=1e-6, centroid=5e-7, mass=1.0, inertia=1e-9)
+    return Bearing(layout=Layout(2, 1, 0), base_height=1e-3, surfaces=[surface], bodies=[body], gravity=9.81)
+
+
+PLANE = Effects(dimension="planar", rims=False, bouc_wen="plastic")
+
+
+def sliding_block() -> Iterator[Series]:
+    """Slip of a block on a flat base that gets a velocity by a rectangular pulse: V^2/2 (1/(mu g) - 1/A)."""
+    points = []
+    for friction in (0.05, 0.1, 0.2):
+        for ratio in (1.5, 2.0, 3.0, 5.0, 8.0):
+            limit, length = friction * 9.81, 0.2
+            pulse, rest = ratio * limit, 1.1 * (ratio - 1) * length + 0.1
+            pieces = np.zeros((2, 6, 6))
+            pieces[0, 0, 2] = pulse / 2
+            pieces[1, 0, :2] = pulse * length**2 / 2, pulse * length
+            motion = Motion(np.array([0.0, length, length + rest]), pieces, np.array([length]))
+            bearing = point_on_a_dish(1e6, friction, 10.0)
+            scene = Scene(bearing, motion, Top.prescribed((0.0, 0.0, 0.0)), PLANE, Solver(rtol=1e-6))
+            ours = float(np.abs(simulate(scene).history.sliding[-1, 0]))
+            slip = (pulse * length) ** 2 / 2 * (1 / limit - 1 / pulse)
+            points.append(Point(f"mu {friction:g}, A/(mu g) {ratio:g}", slip, ours))
+    yield Series("block on a base that jerks", "Newmark 1965", "closed form", "slip [m]", points)
+
+
+def turning_angles(radius: float, friction: float, start: float) -> list[float]:
+    """Angles at which a block on a circle with Coulomb friction turns, from rest at `start` [rad].
+
+    With w = theta'^2 and s the direction of motion, dw/dtheta = -2 g/R (sin + s mu cos) - 2 s mu w has the solution
+    A cos + B sin + C exp(-2 s mu theta).
+    """
+    found, angle, sign = [], start, -1.0
+    while abs(np.tan(angle)) > friction:
+        m = sign * friction
+        a, b = 2 * (1 - 2 * m * m) / (1 + 4 * m * m), -6 * m / (1 + 4 * m * m)
+
+        def speed(x: float, m: float = m, a: float = a, b: float = b, angle: float = angle) -> float:
+            smooth = a * np.cos(x) + b * np.sin(x)
+            return float(smooth - (a * np.cos(angle) + b * np.sin(angle)) * np.exp(-2 * m * (x - angle)))
+
+        angle = float(brentq(speed, angle + sign * 1e-3, -1.2 * angle + sign * 1e-3))
+        found.append(angle)
+        sign = -sign
+    return found
+
+
+def circle_with_friction() -> Iterator[Series]:
+    """Turning angles of a block that is let go on a circle."""
+    points = []
+    for friction in (0.02, 0.05, 0.1):
+        for start in (0.2, 0.4, 0.6):
+            bearing = point_on_a_dish(2.0, friction, 2.5)
+            still = Motion(np.array([0.0, 12.0]), np.zeros((1, 6, 6)))
+            state = InitialState([[0.0, start, 0.0]], [[0.0, 0.0, 0.0]], [[0.0, 0.0]])
+            top = Top.prescribed((0.0, 0.0, 0.0))
+            scene = Scene(bearing, still, top, PLANE, Solver(rtol=1e-6), initial_state=state, output_step=1e-3)
+            angle = simulate(scene).history.tilt_angles[:, 0, 1]
+            expected = turning_angles(2.0, friction, start)[:3]
+            turns = np.flatnonzero(np.diff(np.sign(np.diff(angle))) * np.sign(angle[1:-1]) < 0) + 1
+            large = [float(angle[i]) for i in turns if abs(angle[i]) > 0.5 * abs(expected[-1])]
+            for number, (reference, ours) in enumerate(zip(expected, large, strict=False), start=1):
+                points.append(Point(f"mu {friction:g}, from {start:g} rad, turn {number}", reference, ours))
+    source = "González-Cataldo, Gutiérrez and Yáñez 2017"
+    yield Series("block let go on a circle", source, "closed form", "turning angle [rad]", points)
+
+
+LOOP = 0.25 * np.array([0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 0.8, 0.4, 0.0, -0.4, -0.8, -1.0, -0.6, -0.2, 0.2, 0.6])  # [m]
+ORBIT = np.linspace(0.0, 2 * np.pi, 25)  # of the orbit [rad]
+FLAT_LOAD = 1e6  # [N]
+
+
+def single_of_opensees(radius: float, friction: float, path: Array, steps: int) -> Array:
+    """Forces on the upper node of OpenSees' `singleFPBearing` at the points of a path, (k, 2) [N].
+
+    path: displacement of that node, shape (k, 2) [m]; steps: between two points.
+    """
+    ops = import_module("openseespy.opensees")
+    ops.wipe()
+    ops.model("basic", "-ndm", 3, "-ndf", 6)
+    ops.node(1, 0.0, 0.0, 0.0)
+    ops.node(2, 0.0, 0.0, 0.0)
+    ops.fix(1, 1, 1, 1, 1, 1, 1)
+    ops.fix(2, 0, 0, 0, 1, 1, 1)
+    ops.frictionModel("Coulomb", 1, friction)
+    ops.uniaxialMaterial("Elastic", 1, 1e11)
+    stiffness = friction * FLAT_LOAD / YIELD + FLAT_LOAD / radius
+    axes = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
+    materials = ("-P", 1, "-T", 1, "-My", 1, "-Mz", 1)
+    ops.element("singleFPBearing", 1, 1, 2, 1, radius, stiffness, *materials, "-orient", *axes, "-iter", 100, 1e-4)
+    ops.timeSeries("Constant", 1)
+    ops.pattern("Plain", 1, 1)
+    ops.load(2, 0.0, 0.0, -FLAT_LOAD, 0.0, 0.0, 0.0)
+    values = np.column_stack([np.interp(np.arange(len(path) * steps) / steps, range(len(path)), x) for x in path.T])
+    for axis in (0, 1):
+        ops.timeSeries("Path", 10 + axis, "-dt", 1.0 / steps, "-values", *values[:, axis].tolist())
+        ops.pattern("Plain", 10 + axis, 10 + axis)
+        ops.sp(2, axis + 1, 1.0)
+    ops.constraints("Transformation")
+    ops.numberer("Plain")
+    ops.system("FullGeneral")
+    ops.test("NormUnbalance", 1e-4, 100, 0)
+    ops.algorithm("Newton")
+    ops.integrator("LoadControl", 1.0 / steps)
+    ops.analysis("Static")
+    forces = np.zeros((len(path), 2))
+    for row in range(1, len(path)):
+        assert ops.analyze(steps) == 0, f"OpenSees failed at point {row}"
+        forces[row] = np.array(ops.eleForce(1))[6:8]
+    ops.wipe()
+    return forces
+
+
+def opensees_single() -> Iterator[Series]:
+    """Loops and orbits of a single pendulum against OpenSees' `singleFPBearing`."""
+    source = "OpenSees singleFPBearing"
+    for radius in (1.0, 2.0, 4.0):
+        for friction in (0.03, 0.1):
+            for name, path in (
+                ("loop", np.column_stack([LOOP, 0 * LOOP])),
+                ("orbit", 0.2 * np.column_stack([np.sin(ORBIT), np.sin(2 * ORBIT)])),
+            ):
+                path = halved(path)
+                reference = single_of_opensees(radius, friction, path, 100)
+                ours = slow_path(radius, friction, path)
+                label = f"single pendulum, R {radius:g} m, mu {friction:g}, {name}"
+                for axis in range(1 if name == "loop" else 2):
+                    points = [
+                        Point(f"({path[i, 0]:.3f}, {path[i, 1]:.3f}) m", reference[i, axis], float(ours[i, axis]))
+                        for i in range(1, len(path), 2)
+                    ]
+                    yield Series(label, source, "program", f"force along E{axis + 1} [N]", points)
+
+
+def halved(path: Array) -> Array:
+    """The path with the middle between every two points, where no corner is near, at odd indices."""
+    whole = np.arange(2 * len(path) - 1) / 2
+    return np.column_stack([np.interp(whole, range(len(path)), x) for x in path.T])
+
+
+YIELD = 1e-3  # yield displacement of both [m]
+
+
+def slow_path(radius: float, friction: float, path: Array) -> Array:
+    """Forces of our pendulum at the points of the same path, half a second for each, shape (k, 2) [N]."""
+    fine = np.linspace(0.0, len(path) - 1.0, 100 * (len(path) - 1) + 1)
+    along = np.column_stack([*(np.interp(fine, range(len(path)), x) for x in path.T), 0 * fine])
+    # Corners are rounded within a step of OpenSees to each side.
+    kernel = np.array([0.25, 0.5, 0.25])
+    along[1:-1] = np.column_stack([np.convolve(x, kernel, "valid") for x in along.T])
+    bearing = point_on_a_dish(radius, friction, 0.9 * radius, YIELD)
+    effects = Effects(rims=False, bouc_wen="plastic")
+    motion = Motion.from_arrays(fine / 2, along)
+    scene = Scene(bearing, motion, Top.rig(FLAT_LOAD, 1e12), effects, Solver(rtol=1e-5), output_step=0.5)
+    return simulate(scene).history.top_force[:, :2]
+
+
+def device_points() -> Iterator[Series]:
+    """Single to quintuple pendulums pushed through all sliding regimes, at every displacement of docs/devices.md."""
+    for device in devices.DEVICES:
+        rows = devices.rows(device)
+        for column, source, kind in (
+            ("circles", "friction circles", "closed form"),
+            ("published", device.source, "formula"),
+            ("arms", f"{device.source}, with the arms of friction", "formula"),
+        ):
+            points = [Point(f"{1e3 * row['u']:.0f} mm", row[column], row["run"]) for row in rows]
+            yield Series(f"{device.title} pendulum", source, kind, "F/W", points)
+
+
+def opensees_triple(scenes: Sequence[Scene], steps: int) -> Iterator[Series]:
+    """Forces of OpenSees' `TripleFrictionPendulum` along whole runs; ours with friction at the pivot, as there."""
+    for scene in scenes:
+        theirs = run_opensees(scene, steps)
+        assert theirs.status == "ok", theirs.message
+        at, pick = comparison_times(scene.end), slice(len(theirs.force) // 24, None, len(theirs.force) // 24)
+        friction = [surface.friction for surface in scene.bearing.surfaces]
+        pivot = replace(scene, bearing=scene.bearing.replace(friction=friction, friction_at="pivot"))
+        history = simulate(replace(pivot, output_step=float(at[1]))).history
+        for axis in range(2):
+            ours = history.top_force[: len(at), axis]
+            if not np.any(theirs.force[:, axis]):
+                continue
+            rows = zip(at[pick], theirs.force[pick, axis], ours[pick], strict=True)
+            points = [Point(f"{t:.3f} s", float(one), float(two)) for t, one, two in rows]
+            source = "OpenSees TripleFrictionPendulum"
+            yield Series(scene.name, source, "program", f"force along E{axis + 1} [N]", points)
+
+
+def here() -> Iterator[Series]:
+    """All series that need no other program."""
+    for part in (mastodon_shear, mastodon_seismic, sliding_block, circle_with_friction, device_points):
+        yield from part()
