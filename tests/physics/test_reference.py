@@ -71,7 +71,7 @@ def total_spin(state: State, k: int) -> Array:
 
 
 def test_angular_velocity_turns_the_material(layout: tuple[int, int, int]) -> None:
-    """(3.12) with phi'_1 t_3^1 for every body, and (2.57) ff.; the printed phi'_1 t_2^1 fails."""
+    """(2.29) and (3.12) with phi'_1 t_3^1 for every body, and (2.57) ff.; the printed phi'_1 t_2^1 fails."""
     _, state, _, _ = random_case(layout, 2)
     turn = rotation(state)
     for k in range(1, layout[0] + 1):

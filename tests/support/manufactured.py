@@ -18,8 +18,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.interpolate import BSpline, make_interp_spline
 
-from generator.heat import HEAT_KERNEL
 from msfp_gen import Bearing, Effects, Top, build_model
+from msfp_gen.generator.heat import HEAT_KERNEL
 from msfp_gen.model.model import Model
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.scene import top as scene_top
