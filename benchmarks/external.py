@@ -9,8 +9,9 @@ import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib import import_module
+from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import devices
 import numpy as np
@@ -215,11 +216,8 @@ ORBIT = np.linspace(0.0, 2 * np.pi, 25)  # of the orbit [rad]
 FLAT_LOAD = 1e6  # [N]
 
 
-def single_of_opensees(radius: float, friction: float, path: Array, steps: int) -> Array:
-    """Forces on the upper node of OpenSees' `singleFPBearing` at the points of a path, (k, 2) [N].
-
-    path: displacement of that node, shape (k, 2) [m]; steps: between two points.
-    """
+def single_element(radius: float, law: str, *numbers: float) -> Any:
+    """OpenSees with a `singleFPBearing` between nodes 1 and 2 under `FLAT_LOAD`; numbers: of its friction law."""
     ops = import_module("openseespy.opensees")
     ops.wipe()
     ops.model("basic", "-ndm", 3, "-ndf", 6)
@@ -227,25 +225,34 @@ def single_of_opensees(radius: float, friction: float, path: Array, steps: int) 
     ops.node(2, 0.0, 0.0, 0.0)
     ops.fix(1, 1, 1, 1, 1, 1, 1)
     ops.fix(2, 0, 0, 0, 1, 1, 1)
-    ops.frictionModel("Coulomb", 1, friction)
+    ops.frictionModel(law, 1, *numbers)
     ops.uniaxialMaterial("Elastic", 1, 1e11)
-    stiffness = friction * FLAT_LOAD / YIELD + FLAT_LOAD / radius
+    stiffness = numbers[0] * FLAT_LOAD / YIELD + FLAT_LOAD / radius
     axes = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
     materials = ("-P", 1, "-T", 1, "-My", 1, "-Mz", 1)
     ops.element("singleFPBearing", 1, 1, 2, 1, radius, stiffness, *materials, "-orient", *axes, "-iter", 100, 1e-4)
     ops.timeSeries("Constant", 1)
     ops.pattern("Plain", 1, 1)
     ops.load(2, 0.0, 0.0, -FLAT_LOAD, 0.0, 0.0, 0.0)
-    values = np.column_stack([np.interp(np.arange(len(path) * steps) / steps, range(len(path)), x) for x in path.T])
-    for axis in (0, 1):
-        ops.timeSeries("Path", 10 + axis, "-dt", 1.0 / steps, "-values", *values[:, axis].tolist())
-        ops.pattern("Plain", 10 + axis, 10 + axis)
-        ops.sp(2, axis + 1, 1.0)
     ops.constraints("Transformation")
     ops.numberer("Plain")
     ops.system("FullGeneral")
     ops.test("NormUnbalance", 1e-4, 100, 0)
     ops.algorithm("Newton")
+    return ops
+
+
+def single_of_opensees(radius: float, friction: float, path: Array, steps: int) -> Array:
+    """Forces on the upper node of OpenSees' `singleFPBearing` at the points of a path, (k, 2) [N].
+
+    path: displacement of that node, shape (k, 2) [m]; steps: between two points.
+    """
+    ops = single_element(radius, "Coulomb", friction)
+    values = np.column_stack([np.interp(np.arange(len(path) * steps) / steps, range(len(path)), x) for x in path.T])
+    for axis in (0, 1):
+        ops.timeSeries("Path", 10 + axis, "-dt", 1.0 / steps, "-values", *values[:, axis].tolist())
+        ops.pattern("Plain", 10 + axis, 10 + axis)
+        ops.sp(2, axis + 1, 1.0)
     ops.integrator("LoadControl", 1.0 / steps)
     ops.analysis("Static")
     forces = np.zeros((len(path), 2))
@@ -256,25 +263,87 @@ def single_of_opensees(radius: float, friction: float, path: Array, steps: int) 
     return forces
 
 
+SHAKING = 6.0  # [s]
+GROUND = np.arange(0.0, SHAKING + 5e-4, 1e-3)  # times of its samples [s]
+
+
+def ground() -> Array:
+    """Acceleration of the base along E1, E2 with a smooth start, shape (k, 2) [m/s^2]."""
+    start = np.minimum(GROUND / 1.0, 1.0) ** 2 * (3 - 2 * np.minimum(GROUND / 1.0, 1.0))
+    return start[:, None] * np.column_stack([2.5 * np.sin(2 * np.pi * 0.6 * GROUND), 1.5 * np.sin(2 * np.pi * GROUND)])
+
+
+def shaken_mass_of_opensees(radius: float, law: str, *numbers: float) -> Array:
+    """Forces of the element on a mass on a shaken base, at `GROUND`, shape (k, 2) [N]."""
+    ops = single_element(radius, law, *numbers)
+    ops.integrator("LoadControl", 1.0)
+    ops.analysis("Static")
+    assert ops.analyze(1) == 0
+    ops.loadConst("-time", 0.0)
+    ops.wipeAnalysis()
+    mass, shaking = FLAT_LOAD / 9.81, ground()
+    ops.mass(2, mass, mass, mass, 0.0, 0.0, 0.0)
+    for axis in (0, 1):
+        values = [*shaking[:, axis].tolist(), float(shaking[-1, axis])]
+        ops.timeSeries("Path", 10 + axis, "-dt", 1e-3, "-values", *values)
+        ops.pattern("UniformExcitation", 10 + axis, axis + 1, "-accel", 10 + axis)
+    ops.constraints("Transformation")
+    ops.numberer("Plain")
+    ops.system("FullGeneral")
+    ops.test("NormUnbalance", 1e-2, 100, 0)
+    ops.algorithm("Newton")
+    ops.integrator("Newmark", 0.5, 0.25)
+    ops.analysis("Transient")
+    forces = np.zeros((len(GROUND), 2))
+    for row in range(1, len(GROUND)):
+        assert ops.analyze(1, 1e-3) == 0, f"OpenSees failed at {GROUND[row]:.3f} s"
+        forces[row] = -np.array(ops.eleForce(1))[6:8]
+    ops.wipe()
+    return forces
+
+
+def opensees_shaken() -> Iterator[Series]:
+    """A mass on one bearing on a base shaken in two directions, with constant friction and by velocity."""
+    source = "OpenSees singleFPBearing, transient"
+    slow = {"friction_slow": 0.03, "velocity_rate": 20.0}
+    for name, law, numbers, values, word in (
+        ("constant friction", "Coulomb", (0.06,), {}, "constant"),
+        ("friction by velocity", "VelDependent", (0.03, 0.06, 20.0), slow, "velocity"),
+    ):
+        for radius in (2.0, 4.0):
+            reference = shaken_mass_of_opensees(radius, law, *numbers)
+            bearing = point_on_a_dish(radius, 0.06, 0.9 * radius, YIELD)
+            bearing = bearing.replace(**{key: [value] for key, value in values.items()})
+            effects = Effects(rims=False, bouc_wen="plastic", friction=word)
+            motion = Motion.from_acceleration(GROUND, np.column_stack([ground(), 0 * GROUND]))
+            top = Top.mass(FLAT_LOAD / 9.81, 1e-3, 0.0)
+            history = simulate(Scene(bearing, motion, top, effects, Solver(rtol=1e-5), output_step=0.05)).history
+            every = np.arange(4, len(history.time), 4)
+            for axis in range(2):
+                points = [
+                    Point(f"{history.time[i]:.2f} s", reference[50 * i, axis], float(history.top_force[i, axis]))
+                    for i in every
+                ]
+                label = f"mass on a shaken base, R {radius:g} m, {name}"
+                yield Series(label, source, "program", f"force along E{axis + 1} [N]", points)
+
+
 def opensees_single() -> Iterator[Series]:
     """Loops and orbits of a single pendulum against OpenSees' `singleFPBearing`."""
-    source = "OpenSees singleFPBearing"
-    for radius in (1.0, 2.0, 4.0):
-        for friction in (0.03, 0.1):
-            for name, path in (
-                ("loop", np.column_stack([LOOP, 0 * LOOP])),
-                ("orbit", 0.2 * np.column_stack([np.sin(ORBIT), np.sin(2 * ORBIT)])),
-            ):
-                path = halved(path)
-                reference = single_of_opensees(radius, friction, path, 100)
-                ours = slow_path(radius, friction, path)
-                label = f"single pendulum, R {radius:g} m, mu {friction:g}, {name}"
-                for axis in range(1 if name == "loop" else 2):
-                    points = [
-                        Point(f"({path[i, 0]:.3f}, {path[i, 1]:.3f}) m", reference[i, axis], float(ours[i, axis]))
-                        for i in range(1, len(path), 2)
-                    ]
-                    yield Series(label, source, "program", f"force along E{axis + 1} [N]", points)
+    loop = halved(np.column_stack([LOOP, 0 * LOOP]))
+    orbit = halved(0.2 * np.column_stack([np.sin(ORBIT), np.sin(2 * ORBIT)]))
+    limits = [(100.0, 0.1), (2.0, 1e-3)]  # next to no curvature, next to no friction
+    cases = [*product((1.0, 2.0, 4.0), (0.03, 0.1)), *limits]
+    for (radius, friction), (name, path, axes) in product(cases, (("loop", loop, (0,)), ("orbit", orbit, (0, 1)))):
+        reference, ours = single_of_opensees(radius, friction, path, 100), slow_path(radius, friction, path)
+        label = f"single pendulum, R {radius:g} m, mu {friction:g}, {name}"
+        for axis in axes:
+            points = [
+                Point(f"({path[i, 0]:.3f}, {path[i, 1]:.3f}) m", reference[i, axis], float(ours[i, axis]))
+                for i in range(1, len(path), 2)
+            ]
+            source = "OpenSees singleFPBearing"
+            yield Series(label, source, "program", f"force along E{axis + 1} [N]", points)
 
 
 def halved(path: Array) -> Array:

@@ -236,7 +236,7 @@ def series(opensees: bool = True) -> list[external.Series]:
     found = list(external.here())
     if opensees:
         scenes = [manual_scene(), *(load_scene(name) for name in OPENSEES_SCENES)]
-        found += [*external.opensees_single(), *external.opensees_triple(scenes, STEPS)]
+        found += [*external.opensees_single(), *external.opensees_shaken(), *external.opensees_triple(scenes, STEPS)]
     return found
 
 
