@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from msfp_gen.buildings.building import Building
 
 ENERGY_LIMIT = 0.02  # error of the energy balance of the building over its largest term, above which a note is written
-GATHERED = ("heat", "law_speed", "law_load", "law_temperature")  # kinds
+GATHERED = ("inertia", "heat", "law_speed", "law_load", "law_temperature")  # kinds
 ENERGY = (
     "the energy balance of the building has an error of {value:.1%} of the largest energy: give a smaller "
     "solver.max_step"
@@ -45,7 +45,7 @@ def notes_of(scene: BuildingScene, monitored: Sequence[Note], error: float, time
 
 
 def _gathered(notes: Sequence[Note]) -> list[Note]:
-    """The notes; of those about friction, which many bearings get, one of each kind stands for all.
+    """The notes; of those about friction and inertia, which many bearings get, one of each kind stands for all.
 
     It is the one with the largest value of those in `RISING`, and else the first.
     """

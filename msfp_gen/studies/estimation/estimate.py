@@ -450,6 +450,8 @@ def _more(
             return False
         planned = moment.variance * (MARGIN * wanted / max(half, 1e-300)) ** 2
         runs = optimal_runs(variances, costs, variance=planned)
+        if moment.unseen:  # its variance falls with the square of the exact runs
+            runs *= min(1.0, exact * half / (MARGIN * wanted) / runs[0])
         needed = float(runs @ costs)
         if question.budget is not None and needed > question.budget:
             raise InputError(
@@ -464,12 +466,7 @@ def _more(
     if len(state.chain) > 1:  # the pilot may lack draws of a kind that the cheap model knows: some more are chosen
         runs[0] = max(runs[0], CHOSEN * state.pilot)
     before = (state.count, dict(state.scale))
-    most = (
-        GROWTH
-        if not moment.unseen or question.target is None
-        else float(np.clip(half / (MARGIN * wanted), CHOSEN, GROWTH))
-    )
-    runs *= min(1.0, most * exact / runs[0])
+    runs *= min(1.0, GROWTH * exact / runs[0])
     runs[-1] = max(runs[-1], LEAST_SHARE * float(runs[:-1] @ costs[:-1]) / costs[-1])
     state.grow(runs)
     return before != (state.count, state.scale)

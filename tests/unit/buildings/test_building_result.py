@@ -181,15 +181,16 @@ def test_a_failed_run_states_how_it_ended():
     assert "steps" in repr(found)
 
 
-def test_notes_of_monitors_name_the_bearing():
+@pytest.mark.parametrize("kind", ["heat", "inertia"])
+def test_notes_of_monitors_name_the_bearing(kind):
     uplift = Note(0.14, "uplift", 3, 5.0, "it is unloaded", "uplift = True")
-    heat = [Note(0.2 + index, "heat", 1, 10.0 + index, "it is hot", bearing=index + 1) for index in range(3)]
+    alike = [Note(0.2 + index, kind, 1, 10.0 + index, "it is much", bearing=index + 1) for index in range(3)]
     lifted = replace(uplift, bearing=1)
-    found = replace(pushed(), monitored=(*heat[::-1], lifted, replace(uplift, time=0.3, action="", bearing=3)))
+    found = replace(pushed(), monitored=(*alike[::-1], lifted, replace(uplift, time=0.3, action="", bearing=3)))
     assert [note.line for note in found.notes] == [
         "t = 0.14 s: bearing 1 (A): it is unloaded; continued with uplift = True",
         "t = 0.3 s: bearing 3: it is unloaded",
-        "t = 2.2 s: bearing 3: it is hot; the same holds for 2 other bearings, with less",
+        "t = 2.2 s: bearing 3: it is much; the same holds for 2 other bearings, with less",
     ]
     assert found.bearings[0].model_changes == (lifted,) and found.bearings[2].model_changes == ()
     assert "notes" in repr(found)
