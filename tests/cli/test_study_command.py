@@ -64,6 +64,11 @@ def test_an_estimate_is_ten_lines(tmp_path: Any, capsys: pytest.CaptureFixture[s
     assert len(shown) <= 10 and "mean of peak_force" in shown[0]
     assert main([*arguments, "--estimate", "peak_force", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["runs"]["exact"] >= 16
+    share = [*arguments, "--estimate", "peak_force", "--statistic", "probability", "--threshold", "1e3"]
+    assert main(share) == 0
+    assert "probability 1000 of peak_force" in capsys.readouterr().out
+    assert main([*share[:-1], "high"]) == 2
+    assert capsys.readouterr().err == "error: accuracy.threshold = 'high': give a number, or a share such as '2 %'\n"
     assert main([*arguments, "--estimate", "drift"]) == 2
     assert capsys.readouterr().err.startswith("error: quantity = 'drift': the study keeps ")
     assert main([*arguments, "--estimate", "peak_force", "--shard", "1/2"]) == 2

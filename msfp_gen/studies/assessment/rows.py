@@ -27,13 +27,13 @@ STATISTICS: dict[str, Callable[..., Any]] = {
 def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
     """The rows of a study as a pandas.DataFrame, sorted by run; those that are not computed yet are not in it.
 
-    columns: only these, and `run` and `status`; None: all. Units are in `DataFrame.attrs["units"]`. Raises InputError:
-    no study there, no rows yet, or an unknown column.
+    columns: only these, and `run` and `status`; None: all. Units are in `DataFrame.attrs["units"]`; `attrs["chosen"]`
+    says whether an estimate chose the runs. Raises InputError: no study there, no rows yet, or an unknown column.
     """
     import pyarrow.dataset as ds
 
     folder = Path(folder)
-    study_table(folder)
+    table = study_table(folder)
     parts = [str(folder / name) for name in sorted(parts_in(folder))]
     if not parts:
         raise InputError(f"{str(folder)!r}: the study has no rows yet; run it")
@@ -46,6 +46,7 @@ def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
     wanted = None if columns is None else list(dict.fromkeys(["run", "status", *columns]))
     with readable_parts(folder):
         rows = dataset.to_table(columns=wanted).to_pandas().sort_values("run", ignore_index=True)
+    rows.attrs["chosen"] = "listed" in table.get("accuracy", {})
     rows.attrs["units"] = {field.name: (field.metadata or {}).get(b"units", b"").decode() for field in dataset.schema}
     return rows
 
@@ -105,8 +106,13 @@ def intensities(rows: Any, name: str) -> Array:
 def demands(rows: Any, name: str) -> Array:
     """A column as demands: of runs that ended early a lower bound, zero where they have none.
 
-    Raises InputError where a run that reached its end has no value.
+    Raises InputError where a run that reached its end has no value, and for runs that an estimate chose.
     """
+    if rows.attrs.get("chosen"):
+        raise InputError(
+            f"{name}: the runs of an estimate were chosen where they decide most, which a curve through them does not "
+            "know; give --estimate with --statistic fragility and a threshold, or run the study without an estimate"
+        )
     values, ended = numbers(rows, name), complete(rows)
     if np.isnan(values[ended]).any():
         count = int(np.isnan(values[ended]).sum())

@@ -51,6 +51,7 @@ ROUNDS = 8
 GROWTH = 3.0  # of the exact runs from one round to the next, at most
 MARGIN = 0.9  # of the half width that the runs are planned for, over the target
 MOST = 200_000  # draws
+MORE = 1.2  # exact runs planned for one more round, over those planned before, at least
 CHOSEN = 1.5  # exact runs at least, over those of the pilot
 LEAST_SHARE = 0.2  # time of the cheapest runs, over that of the others, at least: so a rare event is seen by them
 CHEAP = 8  # cheap runs for each exact one in the pilot
@@ -166,8 +167,14 @@ def question_of(study: Study, **given: Any) -> Question:
 
 
 def _number(text: str, unit: str) -> float:
+    """The number of a text: with a unit, or a plain one or a share in percent. Raises ValueError with the remedy."""
+    if unit:
+        return float(to_si(text, unit))
     share = text.strip().removesuffix("%")
-    return float(share) / 100 if share != text.strip() else float(to_si(text, unit))
+    try:
+        return float(share) / (1 if share == text.strip() else 100)
+    except ValueError:
+        raise ValueError("give a number, or a share such as '2 %'") from None
 
 
 def estimate(
@@ -265,6 +272,7 @@ class _State:
         self.chain: tuple[str, ...] = (EXACT,)
         self.count = self.pilot
         self.scale: dict[str, float] = {}
+        self.planned = 0.0  # exact runs
         self.early: dict[str, int] = {}
         self.weights: Any = None
         self.uniform = np.random.default_rng([question.seed, 2**31]).random(MOST)
@@ -321,6 +329,7 @@ class _State:
         self.count = min(max(int(np.ceil(wanted[-1] / 64)) * 64, self.count), limit)
         values = feature(self.outcome(self.chain[-1], np.arange(self.count)))
         weights = self.weights(values)[self.pilot :]
+        self.planned = float(wanted[0])
         for level, number in zip(self.chain[:-1], wanted[:-1], strict=True):
             more = factor_for(weights, float(number) - self.pilot)
             self.scale[level] = max(self.scale.get(level, 0.0), more)
@@ -465,6 +474,8 @@ def _more(
         runs = optimal_runs(variances, costs, seconds=question.budget)
     if len(state.chain) > 1:  # the pilot may lack draws of a kind that the cheap model knows: some more are chosen
         runs[0] = max(runs[0], CHOSEN * state.pilot)
+        if question.target is not None:  # chance may have chosen fewer than were planned
+            runs[0] = max(runs[0], MORE * state.planned)
     before = (state.count, dict(state.scale))
     runs *= min(1.0, GROWTH * exact / runs[0])
     runs[-1] = max(runs[-1], LEAST_SHARE * float(runs[:-1] @ costs[:-1]) / costs[-1])

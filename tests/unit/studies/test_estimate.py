@@ -11,7 +11,7 @@ from msfp_gen import InputError, Motion, load_scene
 from msfp_gen.buildings.file import reduced
 from msfp_gen.scene.backbone import Backbone
 from msfp_gen.scene.file.loader import bearing_from_table
-from msfp_gen.studies import estimate, read_study
+from msfp_gen.studies import estimate, fragility, ida, read_study
 from msfp_gen.studies.batch import run_to_end
 from msfp_gen.studies.estimation.allocation import best_chain, optimal_runs, shares_of_variance, work_of
 from msfp_gen.studies.estimation.backbone_run import parallel
@@ -267,6 +267,9 @@ def test_an_estimate_of_a_study_is_kept_and_continued(tmp_path):
     rows = read_study(tmp_path / "out")
     assert len(rows) == first.runs["exact"] >= 16 and "peak_force" in rows.columns
     assert (tmp_path / "out" / "backbone" / "study.toml").is_file() and first.correlation["backbone"] > 0.8
+    for curve in (lambda: ida(rows, "scale", "peak_force"), lambda: fragility(rows, "scale", "peak_force", [1e4])):
+        with pytest.raises(InputError, match="runs of an estimate were chosen"):
+            curve()
     times = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("part-*")}
     again = estimate(table, tmp_path / "out", threads=True, workers=1)
     assert again.value == first.value and again.interval == first.interval
