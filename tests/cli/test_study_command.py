@@ -119,6 +119,24 @@ def test_killed_studies_continue_to_the_same_table(tmp_path: Any) -> None:
     pd.testing.assert_frame_equal(rows_of(out), rows_of(whole))
 
 
+def test_killed_estimates_continue_with_the_same_draws(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    path = written(tmp_path, accuracy={"models": ["massless"], "pilot": 16, "target": "5 %"}, chunk=2)
+    out, whole = tmp_path / "out", tmp_path / "whole"
+    process = started(path, "-o", out, "--estimate", "peak_force", "--workers", "2")
+    await_parts(out, 2)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate(timeout=30)
+    before = {part.name: part.stat().st_mtime_ns for part in out.glob("part-*.parquet")}
+    found = []
+    for folder in (out, whole):
+        assert main(["study", str(path), "-o", str(folder), "--estimate", "peak_force", "--threads", "--json"]) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    assert before.items() <= {part.name: part.stat().st_mtime_ns for part in out.glob("part-*.parquet")}.items()
+    pd.testing.assert_frame_equal(rows_of(out).head(16), rows_of(whole).head(16))
+    low, high = found[0]["interval"]
+    assert low <= found[1]["value"] <= high and found[0]["runs"]["exact"] >= 16
+
+
 def test_ctrl_c_keeps_what_is_done(tmp_path: Any) -> None:
     path, out = written(tmp_path, sampling={"samples": 300, "seed": 3}, chunk=2), tmp_path / "out"
     process = started(path, "-o", out, "--threads", "--workers", "1")

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
     from msfp_gen.specification.layout import Auto, Effects
 
-STEP = 0.005  # [s], at most
+STEP = 0.01  # [s], at most
 STABLE = 0.5  # largest circular frequency times step
 # Quantities of its runs, without the number of a surface.
 QUANTITIES = (

@@ -225,46 +225,29 @@ def telescoped(
     threshold: the target is the values, and their mean the probability that they are at least this.
     """
     count = len(levels[-1].draws)
-    parts, least, unseen, current = [], [], 0.0, target if threshold is None else (target >= threshold).astype(float)
-    fitted = target
+    parts, current, fitted = [], target if threshold is None else (target >= threshold).astype(float), target
     for upper, lower in pairwise(levels):
         first = fit if threshold is None else exceedance(threshold) if upper is levels[0] else logistic
         predicted = predictions(first, lower.draws, feature(lower.values), upper.draws, fitted, 1 / upper.chances)
         difference = current - predicted[np.searchsorted(lower.draws, upper.draws)]
         parts.append(_contributions(upper, difference, pilot, count))
-        least.append(0.0 if threshold is None else _of_shares(upper, lower, predicted, pilot, count))
         current = fitted = predicted
     parts.append(current)
     groups = [slice(0, pilot), slice(pilot, count)] if 1 < pilot < count - 1 else [slice(0, count)]
-    least.append(0.0)
-    if threshold is not None:  # no run that errs among n does not mean that none does: at most three in n
+    unseen = 0.0
+    if threshold is not None:  # that none of n runs errs does not mean that none does: variance by Jeffreys' prior
         inverse = 1 / levels[0].chances[levels[0].draws >= pilot]
-        unseen = 1 / (pilot + inverse.sum() ** 2 / max(inverse @ inverse, 1.0)) ** 2
-        least[0] = max(least[0], unseen)
+        unseen = 0.5 / (pilot + inverse.sum() ** 2 / max(inverse @ inverse, 1.0)) ** 2
     ends = [len(level.draws) for level in levels]
     left = np.array([1.0 if population is None else max(1 - end / population, 0.0) for end in ends])
-    variances = left * np.maximum([_variance(part, groups) for part in parts], least)
+    own = [_variance(part, groups) for part in parts]
+    variances = left * np.array([max(own[0], unseen), *own[1:]])
     variance = max(_variance(sum(parts, np.zeros(count)), groups) if population is None else 0.0, variances.sum())
     freedom = np.maximum(np.array(ends) - 2.0, 1.0)
     total = float(variance**2 / max(np.sum(variances**2 / freedom), 1e-300)) if variance > 0 else np.inf
     planned = variances * ends * variance / max(float(variances.sum()), 1e-300)
     value = float(np.mean(sum(parts, np.zeros(count))))
     return Moment(value, float(variance), total, planned, bool(unseen > variance / 2))
-
-
-def _of_shares(upper: Runs, lower: Runs, shares: Array, pilot: int, count: int) -> float:
-    """The variance that the differences of yes or no from predicted shares have, if the shares are right.
-
-    Where few runs exceed a threshold it is known better than their own variance, which is often too small.
-    """
-    place = np.searchsorted(lower.draws, upper.draws)
-    own = shares[place] * (1 - shares[place])
-    first = upper.draws < pilot
-    if not len(own[~first]):
-        return float(own.mean()) / len(own)
-    share = float(first.sum()) / _size(upper, pilot, count)
-    main = float(np.sum(own[~first] / upper.chances[~first] ** 2)) * ((1 - share) / (count - pilot)) ** 2
-    return main + float(own[first].mean()) * share**2 / max(int(first.sum()), 1)
 
 
 def _size(level: Runs, pilot: int, count: int) -> float:
