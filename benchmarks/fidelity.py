@@ -282,7 +282,8 @@ def hospital(folder: Path) -> str:
         "records": {"motions": records, "scales": [0.4, 0.6, 0.8, 1.0]},
         "axes": {"bounds": {"factors": "asce7"}, "damping": damping},
     }  # fmt: skip
-    found = estimate(study, folder, "peak_force", target=pick(0.05, 0.3), pilot=16, workers=1, threads=True)
+    goals = {"target": pick(0.1, 0.3), "pilot": 16, "models": ["backbone"]}
+    found = estimate(study, folder, "peak_force", workers=1, threads=True, **goals)
     return "\n".join(["\nhospital:", str(estimate_table(found)), *found.notes])
 
 
