@@ -8,7 +8,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.specification import contract
-from msfp_gen.specification.friction_laws import HEAT_TIMES
+from msfp_gen.specification.heat_kernel import LONGEST
 
 from .interface import surface_values
 
@@ -29,7 +29,7 @@ def checks_context(spec: ModelSpec) -> dict[str, Any]:
     }
     return {
         "largest_friction_state": repr(contract.LARGEST_FRICTION_STATE),
-        "longest_heating": repr(HEAT_TIMES[1]),
+        "longest_heating": repr(LONGEST),
         "max_rows": repr(contract.MAX_ROWS),
         "ranges": {
             "body": [_range(value, "bodies: ", _index("body", value)) for value in contract.BODY],

@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields
 import sympy as sp
 
 from msfp_gen.specification import contract, rows
+from msfp_gen.specification.heat_kernel import HEAT_KERNEL
 from msfp_gen.specification.layout import ModelSpec
 from msfp_gen.version import __version__
 
@@ -17,7 +18,6 @@ from .derive import Equations
 from .drivers import schedule_context, scheduled_kernels
 from .gradients import COLUMNS, contact_lists
 from .header import environment, public_header, word_enums
-from .heat import HEAT_KERNEL
 from .interface import interface_context, model_name
 from .lower import Kernel, jacobian_column, ordered_active_inputs
 from .printer import to_c

@@ -16,7 +16,7 @@ from .program import Program, Statement, Use
 
 COLUMNS = 4
 """Parameters whose derivatives one call carries: as many numbers as the vectors of most processors hold."""
-CONTACT = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "drill", "mu", "flux", "T")
+CONTACT = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "drill", "mu", "source", "memory")
 """Results of `contact`, beside its moment, whose derivatives are used."""
 CONTACT_INPUTS = ("par", "h", "loc", "g", "c")
 """Inputs of `contact`: parameters, stage formula, force and slip rotation; and what its local equations determine,

@@ -7,9 +7,9 @@ from importlib import resources
 from typing import TYPE_CHECKING
 
 from msfp_gen.specification import contract
+from msfp_gen.specification.heat_kernel import HEAT_KERNEL
 from msfp_gen.version import __version__
 
-from .heat import HEAT_KERNEL
 from .interface import ABI_VERSION, CALL_ERRORS
 
 if TYPE_CHECKING:

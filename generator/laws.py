@@ -1,8 +1,9 @@
 """Friction laws: the fields that a law adds to the blocks, and the statements that it adds to the contact programs.
 
 With a law, the friction coefficient mu is a local unknown of the contact, besides Y and Z: it depends on normal force,
-slip and temperature, which depend on mu in turn. The program `contact` therefore has one more equation to solve. In
-`report_contact` psi~, theta~ and N are given, and mu follows directly. A model of constant friction uses none of this.
+slip and what the surface remembers, such as its temperature, which depend on mu in turn. The program `contact`
+therefore has one more equation to solve. In `report_contact` psi~, theta~ and N are given, and mu follows directly. A
+model of constant friction uses none of this.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from typing import Any
 
 import sympy as sp
 
-from msfp_gen.specification.formula import fold
-from msfp_gen.specification.friction_laws import NUMBERS, Law
+from msfp_gen.specification.formula import Operations, fold
+from msfp_gen.specification.friction_laws import NUMBERS, Law, Memory
 
 from .blocks import Blocks
 from .functions import Modulus, Step
@@ -25,12 +26,7 @@ COVER_TRANSITION = sp.Rational(1, 10)
 """Half-width of the transition, in (x/reach)^2 about 1, over which the patch uncovers the centre of the surface: x is
 within 5 % of `reach`."""
 
-HEAT_FIELDS = [
-    Field("rise", "K", "temperature rise since the start, without the contribution of the flux of this stage"),
-    Field("warming", "s^1/2", "contribution of that flux, per unit of flux; 0 where the temperature is given"),
-]
 TILT_FIELD = Field("tilt", "-", "cosine of the angle between the axes of the two bodies")
-FLUX_FIELD = Field("flux", "K/s^1/2", "sqrt(D/pi)/k times the heat flux mu p v where the patch covers the centre")
 
 
 def with_fields(block: Block, fields: list[Field], before: str | None = None) -> Block:
@@ -56,17 +52,25 @@ def add_law_fields(b: Blocks, law: Law | None) -> Blocks:
         ),
         contact=contact,
     )
-    if not law.depends_on_temperature:
-        return b
-    heat = [FLUX_FIELD, Field("T", "degC", "temperature at the centre"), Field("law_mu", "-", "d mu/d mu likewise")]
+    return b if law.memory is None else _add_memory_fields(b, law.memory)
+
+
+def _add_memory_fields(b: Blocks, memory: Memory) -> Blocks:
+    """The blocks with the fields of what a surface remembers."""
+    given = [
+        Field("past", memory.unit, f"{memory.meaning}: less its start and what the source of this stage contributes"),
+        Field("gain", f"({memory.unit})/({memory.source_unit})", "what it contributes, per unit; 0 where it is given"),
+    ]
+    source = Field("source", memory.source_unit, f"{memory.source}: source of the {memory.meaning}")
+    results = [source, Field("memory", memory.unit, memory.meaning), Field("law_mu", "-", "d mu/d mu likewise")]
+    if memory.where_covered:
+        b = replace(b, local=with_fields(b.local, [TILT_FIELD]), relative=with_fields(b.relative, [TILT_FIELD]))
     return replace(
         b,
-        before=with_fields(b.before, HEAT_FIELDS),
-        stage=with_fields(b.stage, HEAT_FIELDS),
-        local=with_fields(b.local, [TILT_FIELD]),
-        relative=with_fields(b.relative, [TILT_FIELD]),
-        contact=with_fields(contact, heat),
-        report_contact=with_fields(b.report_contact, [FLUX_FIELD]),
+        before=with_fields(b.before, given),
+        stage=with_fields(b.stage, given),
+        contact=with_fields(b.contact, results),
+        report_contact=with_fields(b.report_contact, [source]),
     )
 
 
@@ -96,8 +100,8 @@ def law_results(
     """Results that a law adds to `contact`; empty for constant friction.
 
     They are mu by the law and its derivatives with respect to the friction force over -mu N at constant N and slip
-    velocity. With heating they include the flux, the temperature and the derivative of the law with respect to the
-    unknown mu.
+    velocity. With a memory they include its source, its value and the derivative of the law with respect to the unknown
+    mu.
 
     Args:
         p: program of the contact.
@@ -115,14 +119,16 @@ def law_results(
     c = given["law"]
     variables = law_variables(p, law, par, N, slip["plastic"])
     results: Symbols = {}
-    if law.depends_on_temperature:
-        share = flux_per_coefficient(p, par, variables, loc)
-        results["flux"] = p.let(c["mu"] * share, "flux")
-        results["T"] = p.let(par["start_temperature"] + stage["rise"] + stage["warming"] * results["flux"], "T")
-        variables["T"] = results["T"]
+    memory = law.memory
+    if memory:
+        share = source_of(p, memory, par, variables, loc)
+        results["source"] = p.let(c["mu"] * share, "source") if memory.by_friction else share
+        value = start_of(memory, par) + stage["past"] + stage["gain"] * results["source"]
+        variables[memory.variable] = results["memory"] = p.let(value, memory.variable)
     mu = results["mu"] = coefficient(p, law, par, variables)
-    if law.depends_on_temperature:
-        results["law_mu"] = p.let(partial_derivative(p, mu, variables["T"]) * stage["warming"] * share)
+    if memory:
+        by_memory = partial_derivative(p, mu, results["memory"]) if memory.by_friction else sp.Integer(0)
+        results["law_mu"] = p.let(by_memory * stage["gain"] * share)
     slope = p.let(partial_derivative(p, mu, variables["v"]) * kept)
     return results | {f"law_{name}": p.let(slope * slip[f"plastic_{name}"]) for name in ("Y", "Z")}
 
@@ -137,16 +143,19 @@ def evaluate_law(
     if law is None:
         return par, {}
     variables = law_variables(p, law, par, N, slip["plastic"])
-    if not law.depends_on_temperature:
+    memory = law.memory
+    if memory is None:
         return {**par, "mu": coefficient(p, law, par, variables)}, {}
     stage: Symbols = p.read(b.stage, "h", active=False)
-    mu = coefficient(p, law, par, {**variables, "T": p.let(par["start_temperature"] + stage["rise"], "T")})
-    return {**par, "mu": mu}, {"flux": mu * flux_per_coefficient(p, par, variables, loc)}
+    value = p.let(start_of(memory, par) + stage["past"], memory.variable)
+    mu = coefficient(p, law, par, {**variables, memory.variable: value})
+    source = source_of(p, memory, par, variables, loc)
+    return {**par, "mu": mu}, {"source": mu * source if memory.by_friction else source}
 
 
 def law_variables(p: Program, law: Law, par: Symbols, N: sp.Expr, velocity: sp.Expr) -> Symbols:
-    """Variables of a friction law other than temperature: normal force, sliding velocity and, if needed, pressure."""
-    pressure = {"p": p.let(N / par["area"], "pressure")} if "patch_radius" in law.parameters else {}
+    """Variables of a friction law but its memory: normal force, sliding velocity and, if needed, pressure."""
+    pressure = {"p": p.let(N / par["area"], "pressure")} if law.needs_pressure else {}
     return {"N": N, "v": velocity, **pressure}
 
 
@@ -155,8 +164,20 @@ def coefficient(p: Program, law: Law, par: Symbols, variables: Symbols) -> sp.Ex
     return p.let(fold(law.tree, {**par, **variables}, operations(p)), "mu")
 
 
-def flux_per_coefficient(p: Program, par: Symbols, variables: Symbols, loc: Symbols) -> sp.Expr:
-    """Flux over mu: p v sqrt(D/pi)/k where the contact patch covers the centre of the surface, 0 elsewhere.
+def start_of(memory: Memory, par: Symbols) -> sp.Expr:
+    """Value of a memory at the start."""
+    return par[memory.start] if memory.start else sp.Integer(0)
+
+
+def source_of(p: Program, memory: Memory, par: Symbols, variables: Symbols, loc: Symbols) -> sp.Expr:
+    """Source of a memory, over the friction coefficient where it is proportional to that too."""
+    products: Operations = {**operations(p), "mul": lambda a, b: a * b}
+    source = fold(memory.tree, {**par, **variables}, products)
+    return p.let(source * cover(p, par, loc) if memory.where_covered else source, "share")
+
+
+def cover(p: Program, par: Symbols, loc: Symbols) -> sp.Expr:
+    """1 where the contact patch covers the centre of the surface, 0 elsewhere.
 
     The temperature of a surface is that at its centre. The patch is R sin(tilt) away from there; the transition between
     covered and uncovered is a cubic over `COVER_TRANSITION`.
@@ -164,8 +185,7 @@ def flux_per_coefficient(p: Program, par: Symbols, variables: Symbols, loc: Symb
     distance = p.let((par["R"] / par["reach"]) ** 2 * (1 - loc["tilt"] ** 2))  # squared, over the square of the reach
     z = p.let((1 - distance) / COVER_TRANSITION)
     partly, fully = p.let(Step(z + 1)), p.let(Step(z - 1))
-    cover = p.let(fully + (partly - fully) * (2 + z * (3 - z**2)) / 4, "cover")
-    return p.let(par["heating"] * cover * variables["p"] * variables["v"], "share")
+    return p.let(fully + (partly - fully) * (2 + z * (3 - z**2)) / 4, "cover")
 
 
 def partial_derivative(p: Program, value: sp.Expr, symbol: sp.Symbol) -> sp.Expr:

@@ -288,23 +288,23 @@ def _rim(effects: Effects) -> tuple[Call, ...]:
 
 
 STAGE = Call("contact_stage", ("surface_parameters[j]", "before[j]"), ("stage[j]",))
-"""What the stage formula of friction, and of heat, gives."""
+"""What the stage formula of friction, and of a memory, gives."""
 
 
 def momentum_balances(effects: Effects) -> Schedule:
     """The momentum balances (3.26)-(3.29) at given unknowns (2.119), as PEER 2017/07 states them."""
-    heat = effects.law is not None and effects.law.depends_on_temperature
-    temperature = ("stage[j]",) if heat else ()
+    memory = effects.law is not None and effects.law.memory is not None
+    remembered = ("stage[j]",) if memory else ()
     rim = ("rim[j]",) if effects.rims else ()
     surfaces = Pass(
         Over.SURFACES,
         (
             *_rim(effects),
-            *((STAGE,) if heat else ()),
+            *((STAGE,) if memory else ()),
             Call("slip_rotation", ("body[j+1]", "x[j+1]", "x[j]"), ("relative[j]",)),
             Call(
                 "report_contact",
-                ("surface_parameters[j]", "unknowns[j]", "friction[j]", "relative[j]", *temperature),
+                ("surface_parameters[j]", "unknowns[j]", "friction[j]", "relative[j]", *remembered),
                 ("report_contact[j]",),
             ),
             Call("report_wrench", ("body[j]", "report_contact[j]", *rim), ("force[j]", "moment[j]")),

@@ -29,7 +29,7 @@ MOVING: Mapping[str, tuple[str, ...]] = {
     "body": ("t1", "t2", "t3", "w", "wp", "al", "alp", "C", "V", "A", "ac", "sp", "cp", "st", "ct"),
 }
 """Block -> what moves with the ends, where that is not all of it; a step has a given length."""
-CONTACT = ("M", "dY", "dZ", "mu", "N", "flux")
+CONTACT = ("M", "dY", "dZ", "mu", "N", "source")
 """Results of `contact` on which anything depends."""
 SUPPORT = frozenset({"psi", "theta", "psi1", "theta1"})
 """Results of `rotation_angles` on which a stage depends at the upper end."""

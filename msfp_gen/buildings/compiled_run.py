@@ -152,9 +152,8 @@ class Member:
         parts = (self.rest.bearing, self.rest.top, self.model, at)
         q, v, f = transferred_state(*parts)
         origin, foot = transferred_heights(*parts)
-        law = self.effects.law
-        heat = at.temperature_parts if law is not None and law.depends_on_temperature else None
-        self.port.enter(at.time, q, v, f, ends, origin=origin, monitor_heat=at.monitor_heat, foot=foot, heat=heat)
+        memory = at.memory_of(self.effects.law)
+        self.port.enter(at.time, q, v, f, ends, origin=origin, monitor_heat=at.monitor_heat, foot=foot, memory=memory)
 
 
 BEARINGS_OF_A_THREAD = 8  # fewer are not worth a thread

@@ -113,13 +113,14 @@ def fixed_scene(scene: Scene) -> Scene:
     selection = scene.effect_selection
     refused = {
         "top_rotation": scene.top_rotation is not None,
-        "effects.friction": (law := selection.effects.law) is not None and law.depends_on_temperature,
+        "effects.friction": (law := selection.effects.law) is not None and law.memory is not None,
         "motion": needs_settling(scene),
         "effects.uplift": selection.effects.uplift,
     }
     if names := [name for name, true in refused.items() if true]:
         raise InputError(
-            f"{names[0]}: the explorer runs scenes without tilted plates, heating and uplift; use `msfp-gen report`"
+            f"{names[0]}: the explorer runs scenes without tilted plates, uplift, and friction that depends on heat or "
+            "path; use `msfp-gen report`"
         )
     effects = replace(selection.effects, rims=True)
     if effects.dimension == "planar" and selection.plane_until < scene.end:

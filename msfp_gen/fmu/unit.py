@@ -118,10 +118,10 @@ def _check_exchange(scene: Scene) -> None:
             f"--type me: effects.sliders = {effects.sliders!r}, uplift = {effects.uplift}: Model Exchange needs the "
             "rates of all bodies; give 'inertial' and no uplift, or --type cs"
         )
-    if top.vertical_stiffness is not None or (effects.law is not None and effects.law.depends_on_temperature):
+    if top.vertical_stiffness is not None or (effects.law is not None and effects.law.memory is not None):
         raise InputError(
-            "--type me: a vertical spring below the mass, and friction that depends on temperature, have states that "
-            "Model Exchange does not give; leave them out, or --type cs"
+            "--type me: a vertical spring below the mass, and friction that depends on temperature or path, have "
+            "states that Model Exchange does not give; leave them out, or --type cs"
         )
 
 

@@ -16,8 +16,8 @@ class Stack(Protocol):
     Shapes, with b = n - 1 bodies and c coordinates each, 3, or 6 with uplift: q, v, a (b, c); f and friction rates
     (b, 2); base (3, 6); load (6,); row (row size,), of the fields of `specification.rows`; powers (works,); u unknowns.
 
-    state: keywords `rise`, the temperature above its start value [K], for friction laws with temperature; and `foot`,
-    height of the foot of a mass on a vertical spring and its rate [m], [m/s]; left out: at rest.
+    state: keywords `memory`, what surfaces remember above its start, such as a rise in temperature [K], of laws with
+    it; and `foot`, height of the foot of a mass on a vertical spring and its rate [m], [m/s]; left out: at rest.
     """
 
     def accelerations(

@@ -118,7 +118,7 @@ class Model:
         return self._evaluation(state, a, row, rates, residual, iterations, sign)
 
     def _heat(self, bearing: Bearing, temperature: ArrayLike | None) -> dict[str, Array]:
-        """Keyword `rise` of the stack: temperature above its start value, shape (n-1,) [K]."""
+        """Keyword `memory` of the stack: temperature above its start value, shape (n-1,) [K]."""
         law = self.effects.law
         if temperature is None:
             return {}
@@ -126,7 +126,7 @@ class Model:
             raise InputError(f"temperature: effects.friction = {self.effects.friction!r} depends on none; leave it out")
         count = self.layout.surfaces
         start = [law_parameters(law, bearing, index)["start_temperature"] for index in range(count)]
-        return {"rise": vector(temperature, "temperature", (count,), "degC") - start}
+        return {"memory": vector(temperature, "temperature", (count,), "degC") - start}
 
     def _quasistatic(self, stack: Stack, state: State, heat: dict[str, Array]) -> Evaluation:
         """Evaluation of a massless model: the residual moments measure the distance from equilibrium."""

@@ -43,16 +43,16 @@ class Ode:
 
     `jac(t, y)` is exact: it follows from the balances (3.26)-(3.29) by the implicit function theorem. `y0`: centred and
     at rest. An instance unpacks as `fun, jac, y0`. Raises InputError for massless models, friction laws with
-    temperature, a top on a vertical spring, and a planar model with a motion outside the E1-E3 plane.
+    a memory of the surface, a top on a vertical spring, and a planar model with a motion outside the E1-E3 plane.
     """
 
     def __init__(self, model: Equations, bearing: Bearing, motion: Motion, top: Top) -> None:
         if model.effects.sliders == "massless":
             raise InputError("as_ode: a massless model is no ordinary differential equation; use sliders = 'inertial'")
-        if model.effects.law is not None and model.effects.law.depends_on_temperature:
+        if model.effects.law is not None and model.effects.law.memory is not None:
             raise InputError(
-                f"as_ode: effects.friction = {model.effects.friction!r} has temperatures, which y does not contain; "
-                "use simulate, or a law without T"
+                f"as_ode: effects.friction = {model.effects.friction!r} has temperatures or paths, which y does not "
+                "contain; use simulate, or a law without them"
             )
         if is_sprung(top):
             raise InputError(

@@ -96,6 +96,9 @@ class BearingRows:
     top_moment: Annotated[Array, Rows(("axis",), "N m", "moment of the bearing on the top support at r_nn")]
     # None where the friction does not depend on it.
     temperature: Annotated[Array | None, Rows(("surface",), "degC", "temperature at the centre of the surface")] = None
+    memory: Annotated[
+        Array | None, Rows(("surface",), "", "other state of the surface on which its friction law depends")
+    ] = None
     energy: dict[str, Array]
 
     def __post_init__(self) -> None:

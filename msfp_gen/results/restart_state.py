@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from msfp_gen.model.model import Model
     from msfp_gen.scene.bearing import Bearing
     from msfp_gen.scene.top import Top
+    from msfp_gen.specification.friction_laws import Law
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,9 +29,9 @@ class RestartState:
     time [s]. azimuth: of the frame of the earlier model [rad]. planar: whether it was planar. q, v, f: its angles and
     separations, their rates, and its friction state. foot: height of the foot of the supported mass and its rate, shape
     (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]; rim_force: size of the rim forces, shape (n-1,) [N].
-    base_angles: shape (3,) [rad]. origin: displacement across the bearing at the start, shape (3,) [m]. monitor_heat,
-    heat: parts of the temperature rise of every surface, those that the monitor of heat follows and those of a friction
-    law with temperature, shape (n-1, 14) [K]. All but azimuth and planar come from a snapshot.
+    base_angles: shape (3,) [rad]. origin: displacement across the bearing at the start, shape (3,) [m]. monitor_heat:
+    parts of the temperature rise that the monitor of heat follows, shape (n-1, 14) [K]. memory: parts of what the
+    surfaces remember for the friction law, shape (n-1, parts). All but azimuth and planar come from a snapshot.
     """
 
     time: float
@@ -45,7 +46,7 @@ class RestartState:
     base_angles: Array
     origin: Array
     monitor_heat: Array
-    heat: Array | None = None
+    memory: Array | None = None
 
     @classmethod
     def of(cls, model: Model, run: Run, azimuth: float) -> RestartState:
@@ -58,10 +59,14 @@ class RestartState:
         """The committed state of a two-port, whose ends move in space."""
         return cls(azimuth=0.0, planar=False, **port.state())
 
-    @property
-    def temperature_parts(self) -> Array:
-        """Parts of the temperature rise of every surface, by the friction law or the monitor, shape (n-1, 14) [K]."""
-        return self.monitor_heat if self.heat is None else self.heat
+    def memory_of(self, law: Law | None) -> Array | None:
+        """Parts of what the surfaces remember for a law, shape (n-1, parts); None where it needs none.
+
+        A law of temperature takes those of the monitor of heat where the earlier model had no temperatures.
+        """
+        if law is None or law.memory is None:
+            return None
+        return self.monitor_heat if self.memory is None and law.depends_on_temperature else self.memory
 
     def contact_force(self, bearing: Bearing) -> Array:
         """Interface forces without those of the rims, shape (n-1, 3) [N]."""

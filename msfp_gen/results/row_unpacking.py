@@ -85,6 +85,7 @@ def unpacked(model: Model, rows: Array, azimuth: float, sprung: bool, first: Arr
         "energy": energy,
         "friction_coefficient": f.get("mu"),
         "temperature": f.get("temperature"),
+        "memory": f.get("memory"),
         "top_settlement": f["top_settlement"] if sprung else None,
     }
 

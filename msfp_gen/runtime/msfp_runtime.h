@@ -104,8 +104,8 @@ typedef struct {
     /* Height of the foot of the supported mass and its rate, [m], [m/s]; in a stage with diagonal entry foot_beta [s]
      * what the earlier stages give: y = foot[0] + foot_beta^2 y'', y' = foot[1] + foot_beta y''. */
     double foot[2], foot_beta;
-#if MSFP_HEAT
-    double rise[MSFP_NB], warming; /* temperature above the start [K] is rise + warming * flux of the surface */
+#if MSFP_MEMORY
+    double past[MSFP_NB], gain; /* the memory of a surface is its start + past + gain * source */
 #endif
 } msfp_point;
 
@@ -123,8 +123,8 @@ typedef struct {
 #endif
 } msfp_seed;
 
-/* What the states of a surface follow from: dY/dt, dZ/dt, and with heat its flux. */
-#define MSFP_SURFACE_RATES (MSFP_SHEAR_SIZE + (MSFP_HEAT > 0))
+/* What the states of a surface follow from: dY/dt, dZ/dt, and the source of a memory. */
+#define MSFP_SURFACE_RATES (MSFP_SHEAR_SIZE + (MSFP_MEMORY > 0))
 /* Rows of the Jacobian of a contact: its moment, N, and in models with gradients these rates. */
 #define MSFP_CONTACT_ROWS (MSFP_MOMENT_SIZE + 1 + MSFP_GRADIENTS * MSFP_SURFACE_RATES)
 /* Jacobians of all surfaces with respect to their inputs: of the contacts, lane by lane; of the rims. */
@@ -283,7 +283,7 @@ typedef struct {
     double start_time;            /* [s] */
     const double *origin;         /* [3] r_01 - r_nn at the start of the whole run [m]; NULL: that of this start */
     const double *foot;           /* [2] height of the foot of the supported mass and its rate; NULL: at rest */
-    const double *heat;           /* [MSFP_NB][MSFP_HEAT] parts of the temperature rise [K]; NULL: zero */
+    const double *memory;         /* [MSFP_NB][MSFP_MEMORY] parts of the memories of the surfaces; NULL: zero */
     int monitors, monitor_stop; /* monitors that are active, and those that stop the run: bits 1 << MSFP_MONITOR_... */
     double monitor_normal;        /* least normal force [N] */
     double monitor_peak;          /* largest normal force [N]; 0: no limit */
@@ -302,21 +302,21 @@ typedef struct {
 
 /* Fields that hold one number for each of what is named, or with gradients one array of derivatives ("columns"): the
  * coordinates q as in msfp_point; from v to work what the methods integrate besides; from a to power its rates in the same
- * order, those of q being v. f: Y, Z [-]; foot: height of the foot of the supported mass and its velocity; heat: parts of
- * the rise in temperature [K], see heat.c; work: integrals [J], power: integrands [W]; prescribed_power, load_power: the
+ * order, those of q being v. f: Y, Z [-]; foot: height of the foot of the supported mass and its velocity; memory:
+ * parts of what surfaces remember, see memory.c; work: integrals [J], power: integrands [W]; prescribed_power, load_power: the
  * parts of the power of the input, see msfp_input_parts. */
-#if MSFP_HEAT
-#define MSFP_HEAT_FIELD(type, name) type name[MSFP_NB][MSFP_HEAT];
+#if MSFP_MEMORY
+#define MSFP_MEMORY_FIELD(type, name) type name[MSFP_NB][MSFP_MEMORY];
 #else
-#define MSFP_HEAT_FIELD(type, name)
+#define MSFP_MEMORY_FIELD(type, name)
 #endif
 #define MSFP_STATE_FIELDS(type) \
     type t, q[MSFP_NB][MSFP_NQ]; \
     type v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], foot[2]; \
-    MSFP_HEAT_FIELD(type, heat) \
+    MSFP_MEMORY_FIELD(type, memory) \
     type work[MSFP_WORKS]; \
     type a[MSFP_NB][MSFP_NQ], df[MSFP_NB][2], dfoot[2]; \
-    MSFP_HEAT_FIELD(type, dheat) \
+    MSFP_MEMORY_FIELD(type, dmemory) \
     type power[MSFP_WORKS], prescribed_power, load_power;
 
 /* A state: at the end of a step, at a stage, or inside a step; also a change of one. */
@@ -329,7 +329,7 @@ typedef struct {
 enum {
     MSFP_COORDINATES = MSFP_NB * MSFP_NQ,
     MSFP_INTEGRATED = (offsetof(msfp_state, a) - offsetof(msfp_state, v)) / sizeof(double), /* numbers from v to work */
-    MSFP_INTEGRATED_MOTION = MSFP_INTEGRATED - MSFP_WORKS                                   /* from v to heat */
+    MSFP_INTEGRATED_MOTION = MSFP_INTEGRATED - MSFP_WORKS                                   /* from v to memory */
 };
 /* The numbers of a state, or of its columns, from a field on. */
 #define MSFP_NUMBERS(type, state, field) ((double *)((char *)(state) + offsetof(type, field)))
@@ -357,7 +357,7 @@ typedef struct {
 /* What the monitors know at the end of an accepted step. */
 typedef struct {
     double velocity[MSFP_NB][3];           /* of the bodies [m/s] */
-    double heat[MSFP_NB][MSFP_HEAT_STATES], flux[MSFP_NB]; /* of the monitor of heat, as heat and flux of a state */
+    double heat[MSFP_NB][MSFP_HEAT_STATES], flux[MSFP_NB]; /* of the monitor of heat: as of memory.c, and its source */
     msfp_trip trips[MSFP_MONITORS];
     double shares[MSFP_MONITORS]; /* of the limit, or the distance from a range, of each trip */
 } msfp_monitor_state;

@@ -19,12 +19,11 @@ from msfp_gen.scene.top import MassTop, PrescribedTop
 from msfp_gen.specification.layout import Effects, Layout
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.scene import BuildingScene
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
     from msfp_gen.scene.top import Top
 
-_Scene = TypeVar("_Scene", bound="Scene | BuildingScene")
+_Scene = TypeVar("_Scene")  # of a bearing or of a building
 LOOSE = 1e-2  # relative tolerance of the cheaper models
 JOINT = 0.05  # radius of the joint of the equivalent pendulum, and height of its slider [m]
 JOINT_FRICTION = 1e-3

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from msfp_gen.errors import InputError
 from msfp_gen.specification.formula import Operations, fold, names_in
-from msfp_gen.specification.friction_laws import BUILT_IN, HEAT, VARIABLES, Law, law_parameter_names
+from msfp_gen.specification.friction_laws import BUILT_IN, HEAT, MEMORIES, VARIABLES, Law, law_parameter_names
 
 if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
 
-# Range of every variable over which a law is checked: v [m/s], p [Pa], T [degC], N [N].
+# Range of every variable over which a law is checked: v [m/s], p [Pa], N [N], and of the memories.
 RANGES: dict[str, NDArray[np.float64]] = {
     "v": np.r_[0.0, np.geomspace(1e-6, 2.0, 20)],
     "p": np.geomspace(1e3, 2e8, 16),
-    "T": np.linspace(-40.0, 600.0, 17),
     "N": np.geomspace(1.0, 1e8, 9),
+    **{name: np.linspace(*memory.checked) for name, memory in MEMORIES.items()},
 }
 Dual = tuple[Any, Any]  # a value and its derivative with respect to one variable (forward-mode differentiation)
 

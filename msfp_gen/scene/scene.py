@@ -21,7 +21,7 @@ from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_standing, standing_of
 from msfp_gen.scene.top import NodeTop, Top
 from msfp_gen.specification import contract
-from msfp_gen.specification.friction_laws import HEAT_TIMES
+from msfp_gen.specification.heat_kernel import LONGEST
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
 
@@ -118,10 +118,10 @@ class Scene(SceneFields):
                 "slower motion"
             )
         word, law = self.law
-        if law is not None and law.depends_on_temperature and self.end > HEAT_TIMES[1]:
+        if law is not None and law.depends_on_temperature and self.end > LONGEST:
             raise InputError(
                 f"duration = {self.end:.12g}: effects.friction = {word!r} computes frictional "
-                f"heating for {HEAT_TIMES[1]:g} s; give at most that, or a law without temperature"
+                f"heating for {LONGEST:g} s; give at most that, or a law without temperature"
             )
         if self.output_step is not None and self.output_step > self.end:
             raise InputError(f"output_step = {self.output_step}: give at most the duration, {self.end:.12g} [s]")

@@ -108,8 +108,8 @@ def start_run(
         origin, options["foot"] = transferred_heights(scene.bearing, scene.top, model, at, first_load(scene))
         origin = out_of_plane(origin, at.azimuth, "vector") if becomes_spatial else origin
         options |= {"origin": np.ascontiguousarray(origin), "monitor_heat": at.monitor_heat, "start_time": at.time}
-        if model.effects.law is not None and model.effects.law.depends_on_temperature:
-            options["heat"] = at.temperature_parts
+        if (memory := at.memory_of(model.effects.law)) is not None:
+            options["memory"] = memory
     run: Run = model.extension.Run(
         stack,
         *snapped(frame.motion.knots, frame.motion.coefficients, grid.stops),

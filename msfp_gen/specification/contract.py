@@ -122,7 +122,7 @@ ARRAYS = (
     Array("v", Quantity("rad/s"), "their rates", count="MSFP_NB * MSFP_NQ"),
     Array("f", Quantity(""), "friction state Y, Z", count="MSFP_NB * 2"),
     Array("foot", Quantity("m"), "height of the foot of the mass, and rate", count="2", default=False),
-    Array("heat", Quantity("K"), "parts of the temperature", count="MSFP_NB * MSFP_HEAT"),
+    Array("memory", Quantity(""), "parts of what surfaces remember", count="MSFP_NB * MSFP_MEMORY"),
     Array("origin", Quantity("m"), "r_01 - r_nn without displacement", count="3", default=False),
     Array(
         "monitor_heat",

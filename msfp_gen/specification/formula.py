@@ -152,7 +152,7 @@ def _check_constants(tree: ast.expr) -> None:
 # ---- units ----------------------------------------------------------------------------------------------------------
 
 BASE = ("m", "s", "kg", "K")
-UNITS = {"mu": (0, 0, 0, 0), "v": (1, -1, 0, 0), "p": (-1, -2, 1, 0), "T": (0, 0, 0, 1), "N": (1, -2, 1, 0)}
+UNITS = {"mu": (0, 0, 0, 0), "v": (1, -1, 0, 0), "p": (-1, -2, 1, 0), "N": (1, -2, 1, 0)}
 
 
 @dataclass(frozen=True)
@@ -211,12 +211,15 @@ class _UnitSolver:
         return Unit()
 
 
-def units_of(tree: ast.expr, parameters: Iterable[str]) -> dict[str, str]:
+def units_of(
+    tree: ast.expr, parameters: Iterable[str], others: Mapping[str, tuple[int, int, int, int]]
+) -> dict[str, str]:
     """Units that the parameters of a formula for a dimensionless result must have.
 
     Args:
         tree: from `parse`.
-        parameters: names whose units are unknown; the others are those of `UNITS`.
+        parameters: names whose units are unknown.
+        others: exponents of the units of names beside those of `UNITS`.
 
     Returns:
         Parameter name -> unit as text, for the parameters in the formula.
@@ -225,7 +228,7 @@ def units_of(tree: ast.expr, parameters: Iterable[str]) -> dict[str, str]:
         ValueError: no units of the parameters make the formula consistent.
     """
     solver = _UnitSolver()
-    names = {name: Unit(tuple(map(Fraction, powers))) for name, powers in UNITS.items()}
+    names = {name: Unit(tuple(map(Fraction, powers))) for name, powers in {**UNITS, **others}.items()}
     names |= {name: Unit(unknown={name: Fraction(1)}) for name in parameters}
     solver.require_dimensionless(_unit(tree, names, solver), "a friction coefficient has no unit, the formula has one")
     return {name: str(solver.substituted(names[name])) for name in sorted(names_in(tree) & set(parameters))}

@@ -2,8 +2,8 @@
 
 The names in a formula are those of `VARIABLES` and of fields of `Surface`; `mu` is the reference coefficient
 `Surface.friction`. The formula determines which parameters a surface must define and whether the law needs the pressure
-or the temperature. The generator derives the equations from the same formula, and `scene/friction_parameters.py`
-evaluates it.
+or a memory of the surface, such as its temperature. The generator derives the equations from the same formula, and
+`scene/friction_parameters.py` evaluates it.
 """
 
 from __future__ import annotations
@@ -15,16 +15,90 @@ from functools import cached_property, lru_cache
 from msfp_gen.common.fields import Quantity
 from msfp_gen.errors import InputError
 from msfp_gen.specification.formula import names_in, parse, units_of
+from msfp_gen.specification.heat_kernel import HEAT_KERNEL
 from msfp_gen.specification.values import Value
 
 COEFFICIENTS = ("c1", "c2", "c3", "c4")
-# Variables of a law and their units: sliding velocity, pressure, temperature, normal force.
-VARIABLES = {"v": "m/s", "p": "Pa", "T": "degC", "N": "N"}
 # Surface parameters that a law of pressure (PATCH) or temperature (HEAT) needs besides its own, with their defaults.
 # The default of `patch_radius` is the rim radius of the slider.
 PATCH: dict[str, float | None] = {"patch_radius": None}
-HEAT_TIMES = (1e-3, 1e3)  # range of times over which heat conduction is represented [s] (generator/heat.py)
 HEAT: dict[str, float | None] = {"conductivity": 18.0, "diffusivity": 4.44e-6, "start_temperature": 20.0}
+
+
+@dataclass(frozen=True)
+class Memory:
+    """A state of a surface on which a law may depend: its start plus parts, d(part)/dt = weight source - rate part.
+
+    Attributes:
+        variable: its name in formulas.
+        unit, powers: of the state, and its exponents of m, s, kg, K.
+        source_unit: of its source; weight times source is a rate of the state.
+        meaning: what it is.
+        source: formula of v, p, N and values of the surface.
+        parts: (rate [1/s], weight) of each part.
+        scale: the tolerance of the state is a hundredth of it and of the state itself at `rtol` = 1e-3.
+        checked: (lowest, highest, number) of the values at which a law is checked.
+        by_friction: whether the source is also proportional to the friction coefficient.
+        where_covered: whether it is zero where the contact patch does not cover the centre of the surface.
+        start: the parameter of the surface with its value at the start; "": zero.
+        parameters: surface parameters that it needs, with their defaults.
+        values: derived values of the surface that the compiled model stores for it.
+    """
+
+    variable: str
+    unit: str
+    powers: tuple[int, int, int, int]
+    source_unit: str
+    meaning: str
+    source: str
+    parts: tuple[tuple[float, float], ...]
+    scale: float
+    checked: tuple[float, float, int]
+    by_friction: bool = False
+    where_covered: bool = False
+    start: str = ""
+    parameters: tuple[tuple[str, float | None], ...] = ()
+    values: tuple[str, ...] = ()
+
+    @cached_property
+    def tree(self) -> ast.expr:
+        """Syntax tree of the source."""
+        return parse(self.source, {"v", "p", "N", *self.values, *dict(self.parameters)})
+
+
+TEMPERATURE = Memory(
+    "T", "degC", (0, 0, 0, 1), "K/s^1/2",
+    "temperature at the centre, heated by friction",
+    "heating * p * v",
+    HEAT_KERNEL,
+    scale=10.0,
+    checked=(-40.0, 600.0, 17),
+    by_friction=True,
+    where_covered=True,
+    start="start_temperature",
+    parameters=tuple(HEAT.items()),
+    values=("reach", "heating", "start_temperature"),
+)  # fmt: skip
+MEMORIES = {
+    memory.variable: memory
+    for memory in (
+        TEMPERATURE,
+        Memory(
+            "s",
+            "m",
+            (1, 0, 0, 0),
+            "m/s",
+            "path of sliding since the start",
+            "v",
+            ((0.0, 1.0),),
+            scale=1.0,
+            checked=(0.0, 1e3, 9),
+        ),
+    )
+}
+"""What a surface may remember of its sliding, by the name in formulas; a law takes at most one of them."""
+# Variables of a law and their units: sliding velocity, pressure, normal force, and the memories.
+VARIABLES = {"v": "m/s", "p": "Pa", "N": "N", **{name: memory.unit for name, memory in MEMORIES.items()}}
 
 _NUMBERS = (
     Value("friction_slow", Quantity("", least=0.0), "friction coefficient at rest"),
@@ -79,23 +153,31 @@ class Law:
         return parse(self.text, {"mu", *VARIABLES, *(name for name, _ in self.values)})
 
     @cached_property
+    def memory(self) -> Memory | None:
+        """The memory of the surface that the formula contains; None without one."""
+        return next((memory for name, memory in MEMORIES.items() if name in names_in(self.tree)), None)
+
+    @property
     def depends_on_temperature(self) -> bool:
         """Whether the formula contains the temperature T."""
-        return "T" in names_in(self.tree)
+        return self.memory is TEMPERATURE
+
+    @cached_property
+    def needs_pressure(self) -> bool:
+        """Whether the formula, or the source of its memory, contains the pressure."""
+        return any("p" in names_in(item.tree) for item in (self, self.memory) if item is not None)
 
     @cached_property
     def parameters(self) -> dict[str, float | None]:
         """Surface parameters that the law needs -> default; None: must be given."""
-        needs_patch = self.depends_on_temperature or "p" in names_in(self.tree)
-        heat = HEAT if self.depends_on_temperature else {}
-        return {**dict(self.values), **(PATCH if needs_patch else {}), **heat}
+        memory = dict(self.memory.parameters) if self.memory else {}
+        return {**dict(self.values), **(PATCH if self.needs_pressure else {}), **memory}
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
         """Names of the values of one surface in the order in which the compiled model stores them."""
-        patch = ("area",) if "patch_radius" in self.parameters else ()
-        heat = ("reach", "heating", "start_temperature") if self.depends_on_temperature else ()
-        return (*(name for name, _ in self.values), *patch, *heat)
+        patch = ("area",) if self.needs_pressure else ()
+        return (*(name for name, _ in self.values), *patch, *(self.memory.values if self.memory else ()))
 
 
 _VELOCITY = "mu - (mu - friction_slow) * exp(-velocity_rate * v)"
@@ -157,7 +239,9 @@ def law_of(word: str, text: str | None = None) -> Law | None:
         )
     try:
         tree = parse(text, {"mu", *VARIABLES, *COEFFICIENTS})
-        units_of(tree, COEFFICIENTS)
+        units_of(tree, COEFFICIENTS, {name: memory.powers for name, memory in MEMORIES.items()})
+        if len(used := sorted(names_in(tree) & set(MEMORIES))) > 1:
+            raise ValueError(f"a law depends on one memory of the surface at most; leave out one of {', '.join(used)}")
     except ValueError as error:
         raise InputError(f"effects.friction_law = {text!r}: {error}") from None
     values = tuple((name, None) for name in COEFFICIENTS if name in names_in(tree))

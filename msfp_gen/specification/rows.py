@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from msfp_gen.specification.friction_laws import TEMPERATURE
+
 if TYPE_CHECKING:
     from msfp_gen.specification.layout import Effects
 
@@ -58,6 +60,7 @@ _ROW = (
     Quantity("work", (Extent.WORKS,), "J", "integrals over the run"),
     Quantity("mu", (_N,), "-", "friction coefficient", "law"),
     Quantity("temperature", (_N,), "degC", "temperature of the surface", "heat"),
+    Quantity("memory", (_N,), "-", "what the surface remembers, on which its friction law depends", "memory"),
 )
 
 
@@ -86,11 +89,12 @@ def extremes(effects: Effects) -> tuple[Quantity, ...]:
 
 
 def _present(quantities: tuple[Quantity, ...], effects: Effects) -> tuple[Quantity, ...]:
-    law = effects.law
+    law, memory = effects.law, None if effects.law is None else effects.law.memory
     has = {
         "": True,
         "uplift": effects.uplift,
         "law": law is not None,
-        "heat": law is not None and law.depends_on_temperature,
+        "heat": memory is TEMPERATURE,
+        "memory": memory not in (None, TEMPERATURE),
     }
     return tuple(quantity for quantity in quantities if has[quantity.needs])

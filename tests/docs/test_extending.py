@@ -12,15 +12,23 @@ from pathlib import Path
 import pytest
 from support import ROOT
 
-LAW, NUMBER, FIELD, SWITCHES = re.findall(
+LAW, NUMBER, FIELD, MEMORY, REMEMBERING, NUMBERS, FIELDS, SWITCHES = re.findall(
     r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(encoding="utf-8"), re.DOTALL
 )
+
+
+def entries(block: str) -> str:
+    """What a page shows within the parentheses of a tuple, as the formatter requires."""
+    return block.removeprefix("(\n").removesuffix(")\n")
+
+
+LAWS = "msfp_gen/specification/friction_laws.py"
 WHERE = {
-    # The page shows the entry within the parentheses of `_LAWS`, as the formatter requires.
-    ("msfp_gen/specification/friction_laws.py", "_LAWS = (\n"): LAW.removeprefix("(\n").removesuffix(")\n"),
-    ("msfp_gen/specification/friction_laws.py", "_NUMBERS = (\n"): f"    {NUMBER.strip()},\n",
+    (LAWS, "_LAWS = (\n"): entries(LAW) + entries(REMEMBERING),
+    (LAWS, "_NUMBERS = (\n"): f"    {NUMBER.strip()},\n" + entries(NUMBERS),
+    (LAWS, "        TEMPERATURE,\n"): entries(MEMORY),
     ("msfp_gen/specification/hysteresis.py", "HYSTERESIS = {\n"): SWITCHES,
-    ("msfp_gen/scene/bearing.py", "    friction_slow: Annotated[float | None"): FIELD,
+    ("msfp_gen/scene/bearing.py", "    friction_slow: Annotated[float | None"): FIELD + FIELDS,
 }
 SCENE = """
 from dataclasses import replace
@@ -107,5 +115,38 @@ want = surface.friction - 0.02 * np.tanh(p / 30e6)
 assert np.abs(rows.friction_coefficient[:, 0] - want).max() < 1e-6 * want.max()
 assert np.ptp(want) > 0 and want.max() < surface.friction
 assert np.abs(rows.friction_state[-1, 0]).max() > 0.999
+""",
+    )
+
+
+@pytest.mark.slow
+def test_the_law_with_a_state_of_its_own_runs(extended: Path) -> None:
+    """The state is what its equation says, and friction what the formula says."""
+    run(
+        extended,
+        """
+from dataclasses import replace
+import numpy as np
+from msfp_gen import Effects, Motion, load_scene, simulate
+scene = load_scene("single-articulated-push")
+bearing = scene.bearing.replace(sliding_drop=0.4, sliding_path=0.02)
+motion = Motion.harmonic(0.05, 0.5, cycles=2).held(2.0)
+scene = replace(scene, bearing=bearing, effects=Effects(friction="recovering"), motion=motion, motion_table=None,
+                stop=None, duration=6.0, output_step=0.01, solver=replace(scene.solver, rtol=1e-6))
+found = simulate(scene)
+rows = found.history
+assert found.succeeded
+mu = bearing.surfaces[0].friction * (1 - 0.4 * np.tanh(rows.memory[:, 0] / 0.02))
+assert np.abs(rows.friction_coefficient[:, 0] / mu - 1).max() < 1e-4  # rows inside steps are interpolated
+y = (rows.friction_state[:, 0] ** 2).sum(-1)
+v = y * np.maximum((rows.friction_state[:, 0] * rows.slip_velocity[:, 0]).sum(-1), 0.0)
+z, path = 0.0, [0.0]
+for a, b, h in zip(v[:-1], v[1:], np.diff(rows.time)):
+    z = np.exp(-2.0 * h) * z + 0.5 * h * (np.exp(-2.0 * h) * a + b)
+    path.append(z)
+assert np.ptp(path) > 0.02 and np.abs(rows.memory[:, 0] - path).max() < 3e-3 * np.max(path)
+assert rows.memory[-1, 0] < 0.1 * rows.memory[:, 0].max()
+slopes = simulate(scene, gradients=["bearing.surfaces[0].sliding_drop"], gradient_errors=False).gradient
+assert np.abs(slopes["friction_coefficient"].values).max() > 0
 """,
     )

@@ -144,7 +144,7 @@ typedef struct {
     const double *support;   /* [2][6] psi, theta [rad] of the support of the top plate, and rates; with top_rotation */
     const double *foot;      /* [2] height of the foot of the mass on a vertical spring [m], its rate [m/s]; NULL: at
                               * rest, the spring carries the weight */
-    const double *rise;      /* [nb] temperature above the start [K]; of a friction law with temperature */
+    const double *memory;    /* [nb] what the surfaces remember, above the start (of a temperature [K]); NULL: nothing */
 } msfp_inputs;
 
 /* How the accelerations of an evaluation were found. */
@@ -179,7 +179,7 @@ typedef struct {
     const double *q, *v;         /* [nb][nq] as in msfp_inputs */
     const double *f;             /* [nb][2] friction state Y, Z [-], within the unit disc */
     const double *foot;          /* [2] as in msfp_inputs */
-    const double *heat;          /* [nb][api->heat_states] parts of the temperature above the start [K] */
+    const double *memory;        /* [nb][api->memory_states] parts of what the surfaces remember, above the start */
     const double *origin;        /* [3] r_01 - r_nn at which the displacement is zero [m]; NULL: that of the start */
     const double *monitor_heat;  /* [nb][MSFP_HEAT_STATES] parts of the temperature rise that the monitor of heat follows [K] */
     double start_time, end_time; /* [s] */
@@ -244,7 +244,7 @@ typedef struct {
     double *q, *v;        /* [nb][nq] as in msfp_inputs */
     double *f;            /* [nb][2] friction state Y, Z [-]; what the error of a step adds to mu N is left out */
     double *foot;         /* [2] as in msfp_inputs */
-    double *heat;         /* [nb][api->heat_states] parts of the temperature above the start [K] */
+    double *memory;       /* [nb][api->memory_states] as in msfp_scene */
     double *force;        /* [nb][3] force on the body above each surface, of the last row [N] */
     double *rim_force;    /* [nb] size of the rim forces of that row [N] */
     double *base_angles;  /* [3] psi, theta, phi of the base in that row [rad] */
@@ -293,7 +293,7 @@ typedef struct msfp_api {
     int coordinates;         /* nq of a body: 3, with uplift 6 */
     int dof;                 /* unknowns of the condensed equations */
     int unknowns;            /* of the momentum balances: accelerations, contact positions, normal forces */
-    int heat_states;         /* of a surface, where friction depends on temperature; else 0 */
+    int memory_states;       /* of a surface, where friction depends on its temperature or path; else 0 */
     int top_rotation;        /* 1: the support of the top plate rotates as prescribed */
     /* Lists of numbers, and how many numbers and fields each has. */
     int body_size, surface_size, top_size;          /* what bearing_new takes for a body, a surface, the top */
@@ -325,9 +325,9 @@ typedef struct msfp_api {
                    int *in_tension);
     /* Residual [dof] and tangent [dof][dof] of the condensed equations in a stage of an implicit method, q = Q + cq x,
      * v = V + cv x, a = A + ca x. at->f: fp of the stage formula f = fp + beta df/dt, beta [s]; found [nb][2]: Y, Z.
-     * at->foot: y - beta^2 y'', y' - beta y''; warming [K/W]: temperature is at->rise + warming * heat flux. */
+     * at->foot: y - beta^2 y'', y' - beta y''; gain: a memory is its start + at->memory + gain * source. */
     int (*condensed)(const msfp_bearing *bearing, const msfp_inputs *at, double cq, double cv, double ca, double beta,
-                     double warming, double *residual, double *tangent, double *found);
+                     double gain, double *residual, double *tangent, double *found);
     /* Residual [unknowns] of the momentum balances [N], [N m] at given unknowns, body by body: linear, angular. jacobian
      * [unknowns][count], of the rates of Y, Z [2 nb][count]. */
     int (*momentum_balances)(const msfp_bearing *bearing, const msfp_inputs *at, const double *unknowns,
@@ -466,7 +466,7 @@ typedef struct msfp_api {
     void (*port_trips)(const msfp_port *port, msfp_trip *trips);         /* [MSFP_MONITORS] */
     void (*port_state)(const msfp_port *port, msfp_run_state *state);    /* the committed one, as of run_state */
     /* Continue in a two-port at rest from the state of one of another model: of `state` start_time, q, v, f, and foot,
-     * origin, heat, monitor_heat, those NULL as of scene_default; ends: their motion. Status as of port_new. */
+     * origin, memory, monitor_heat, those NULL as of scene_default; ends: their motion. Status as of port_new. */
     int (*port_enter)(msfp_port *port, const msfp_scene *state, const double *ends);
 } msfp_api;
 

@@ -6,6 +6,7 @@ import pickle
 from dataclasses import replace
 from functools import cache
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,12 +19,12 @@ from support.random_states import inputs, sensible
 
 from msfp_gen import Effects, InputError, Layout, Motion, RunError, Scene, Solver, build_model, simulate
 from msfp_gen.generator import generate
-from msfp_gen.generator.heat import HEAT_ERROR, HEAT_KERNEL, HEAT_ONSET, LONGEST, SHORTEST
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.result import Result
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
 from msfp_gen.scene.friction_parameters import coefficient
 from msfp_gen.specification.friction_laws import BUILT_IN, law_of
+from msfp_gen.specification.heat_kernel import HEAT_ERROR, HEAT_KERNEL, HEAT_ONSET, LONGEST, SHORTEST
 from msfp_gen.specification.layout import ModelSpec
 
 
@@ -125,7 +126,7 @@ def test_tangent_of_a_stage_is_consistent(word: str, effects: dict[str, Any]) ->
     f = np.ascontiguousarray(0.5 * h * [1.0, 0.0 if flat else 1.0])
     external = np.r_[load.force, load.moment] * (np.array([1, 0, 1, 0, 1, 0]) if flat else 1)
     cq, cv, ca, beta = 1e-3, 1.0, 1e3, 1e-3
-    heat = {"rise": np.array([10.0, 60.0, 5.0, 0.0]), "warming": 0.05} if word == "pvt" else {}
+    heat = {"memory": np.array([10.0, 60.0, 5.0, 0.0]), "gain": 0.05} if word == "pvt" else {}
 
     def at(x: Array) -> Any:
         d = np.zeros_like(q)
@@ -311,15 +312,49 @@ def test_results_and_scenes_come_back(tmp_path: Any) -> None:
 
 def test_constant_friction_emits_nothing_of_a_law() -> None:
     files = generate(ModelSpec(Layout.tfp())).files
-    for word in ("MSFP_LAW", "MSFP_HEAT", "coefficient[", "flux", "temperature"):
+    for word in ("MSFP_LAW", "MSFP_MEMORY", "coefficient[", "source", "memory"):
         assert word not in files["msfp_kernels.h"], word
     header = files["msfp_model.h"]
     assert (
-        "#define MSFP_LAW 0 " in header and "#define MSFP_LAW_VALUES 0 " in header and "#define MSFP_HEAT 0 " in header
+        "#define MSFP_LAW 0 " in header
+        and "#define MSFP_LAW_VALUES 0 " in header
+        and "#define MSFP_MEMORY 0 " in header
     )
     assert "coefficient[" not in header and "MSFP_SURFACE_PARAMETERS_HEATING" not in header
     with_heat = generate(ModelSpec(Layout.tfp(), Effects(friction="pvt"))).files
-    assert "#define MSFP_HEAT MSFP_HEAT_STATES" in with_heat["msfp_model.h"] and "heat.c" in runtime_sources()
+    assert "#define MSFP_MEMORY 14 " in with_heat["msfp_model.h"] and "memory.c" in runtime_sources()
+
+
+def worn(**solver: Any) -> Scene:
+    """A law of the path of sliding: friction falls by 30 % over some decimetres."""
+    scene = scene_of("fenz-test2", motion=Motion.harmonic(0.025, 0.2), solver={"rtol": 1e-6, **solver})
+    effects = Effects(friction="custom", friction_law="mu * (1 - c1 * (1 - exp(-s / c2)))")
+    return replace(scene, bearing=scene.bearing.replace(c1=0.3, c2=0.05), effects=effects, output_step=0.01)
+
+
+@pytest.mark.parametrize("method", ["implicit", "esdirk4"])
+def test_friction_by_the_path_of_sliding(method: str, tmp_path: Path) -> None:
+    """The path is the integral of the sliding velocity, and friction that of the formula."""
+    scene = worn(method=method)
+    run = simulate(scene)
+    rows = run.history
+    assert (
+        run.succeeded and rows.memory is not None and rows.friction_coefficient is not None and rows.temperature is None
+    )
+    v = reference.sliding_velocity(rows.friction_state, rows.slip_velocity)
+    path = np.vstack([np.zeros(4), np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(rows.time)[:, None], axis=0)])
+    assert path[-1].max() > 0.15
+    assert np.abs(rows.memory - path).max() < 2e-3 * path.max()
+    mu = np.array([surface.friction for surface in scene.bearing.surfaces])
+    want = mu * (1 - 0.3 * (1 - np.exp(-rows.memory / 0.05)))
+    assert np.abs(rows.friction_coefficient / want - 1).max() < 1e-6
+    assert run.dataset["memory"].dims == ("time", "surface")
+    assert Result.from_netcdf(run.to_netcdf(tmp_path / "run.nc")).history.memory == pytest.approx(rows.memory)
+
+
+def test_a_law_takes_one_memory() -> None:
+    with pytest.raises(InputError, match="one memory of the surface at most; leave out one of T, s"):
+        Effects(friction="custom", friction_law="mu * (1 - c1 * tanh(s / c2 + T / c3))")
 
 
 def test_formula_is_part_of_the_models_name() -> None:

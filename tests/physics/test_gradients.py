@@ -12,7 +12,7 @@ import pytest
 from support import Array, scene_of
 from support.gradients import DAMPED, derivative, double, heated, lifting, single, step_of, triple, values_around
 
-from msfp_gen import Load, Motion, Rotation, Scene, simulate
+from msfp_gen import Effects, Load, Motion, Rotation, Scene, simulate
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.results.gradient import ENERGIES
 from msfp_gen.results.history import ENERGY
@@ -161,6 +161,15 @@ def test_extremes_of_a_friction_law_that_heats_are_those_of_the_steps() -> None:
         expected = slopes[name].values[0][rows, np.arange(rows.size)]
         assert np.abs(expected).max() > 0
         np.testing.assert_allclose(summary[key], expected, rtol=1e-9, err_msg=key)
+
+
+@pytest.mark.slow
+def test_differences_with_the_same_steps_through_friction_that_falls_with_the_path() -> None:
+    scene = double()
+    bearing = scene.bearing.replace(friction_slow=None, velocity_rate=None, c1=0.3, c2=0.02)
+    effects = Effects(friction="custom", friction_law="mu * (1 - c1 * (1 - exp(-s / c2)))", rims=False)
+    paths = ["bearing.surfaces[*].friction", "bearing.surfaces[0].radius", "bearing.surfaces[0].c1", "motion.scale"]
+    check_frozen(replace(scene, bearing=bearing, effects=effects), paths, 1e-5, weak=1.0)
 
 
 @pytest.mark.slow

@@ -53,7 +53,7 @@ class Bench:
 
     def arrays(self) -> dict[str, Array]:
         """Every array of a scene, by the name of its field, with sound numbers."""
-        nb, nq, heat = self.nb, self.nq, self.api.heat_states
+        nb, nq, parts = self.nb, self.nq, self.api.memory_states
         pieces = np.zeros((2, 6, 6))
         motion, load = pieces.copy(), pieces.copy()
         motion[:, 0, 2], motion[1, 0, 1], motion[1, 0, 0] = 0.02, 0.02, 0.005  # one parabola
@@ -72,8 +72,8 @@ class Bench:
         if nq == 6:  # the unilateral contacts carry the load
             found["q"][:, 3:] = 0.0
             found["q"][:, 5] = -1e-4
-        if heat:
-            found["heat"] = np.zeros((nb, heat))
+        if parts:
+            found["memory"] = np.zeros((nb, parts))
         if not self.api.top_rotation:
             del found["support.knots"], found["support.coefficients"]
         return found
@@ -233,7 +233,7 @@ def input_cases(b: Bench) -> Iterator[Case]:
     """Every array of msfp_inputs, and the other arguments, of every kind of evaluation."""
     nb, nq, api = b.nb, b.nq, b.api
     sizes = {"q": nb * nq, "v": nb * nq, "a": nb * nq, "f": nb * 2, "base": 18, "load": 6, "support": 12, "foot": 2}
-    sizes["rise"] = nb
+    sizes["memory"] = nb
     assert set(sizes) == {name for name, _ in api.structs["msfp_inputs"]._fields_}
     dof, unknowns, size = api.dof, api.unknowns, api.row_size
     balance = np.full(unknowns, 0.01)

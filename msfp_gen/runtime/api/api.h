@@ -42,7 +42,7 @@ int msfp_api_accelerations(const msfp_bearing *bearing, const msfp_inputs *at, i
 int msfp_api_observe(const msfp_bearing *bearing, const msfp_inputs *at, double *row, double *powers, double *rates,
                      int *in_tension);
 int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, double cq, double cv, double ca,
-                       double beta, double warming, double *residual, double *tangent, double *found);
+                       double beta, double gain, double *residual, double *tangent, double *found);
 int msfp_api_momentum_balances(const msfp_bearing *bearing, const msfp_inputs *at, const double *unknowns,
                                const msfp_variable *variables, int count, double *residual, double *jacobian,
                                double *rates);

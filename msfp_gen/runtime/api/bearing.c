@@ -15,7 +15,7 @@ static int valid_inputs(const msfp_inputs *at)
 {
     return msfp_all_finite(at->q, STATE) && msfp_all_finite(at->v, STATE) && msfp_all_finite(at->a, STATE)
            && msfp_all_finite(at->f, 2 * NB) && msfp_all_finite(at->base, 18) && msfp_all_finite(at->load, 6)
-           && msfp_all_finite(at->support, 12) && msfp_all_finite(at->foot, 2) && msfp_all_finite(at->rise, NB);
+           && msfp_all_finite(at->support, 12) && msfp_all_finite(at->foot, 2) && msfp_all_finite(at->memory, NB);
 }
 
 /* The point of an evaluation. Returns MSFP_OK, MSFP_E_ARGUMENT or MSFP_E_FINITE. */
@@ -39,8 +39,8 @@ static int point_of(const msfp_bearing *bearing, const msfp_inputs *at, msfp_poi
         copied(point->foot, at->foot, 2);
     else
         msfp_foot_at_rest(&bearing->parameters, point, point->foot);
-#if MSFP_HEAT
-    copied(point->rise, at->rise, NB);
+#if MSFP_MEMORY
+    copied(point->past, at->memory, NB);
 #endif
     return MSFP_OK;
 }
@@ -137,13 +137,13 @@ int msfp_api_observe(const msfp_bearing *bearing, const msfp_inputs *at, double 
 }
 
 int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, double cq, double cv, double ca,
-                       double beta, double warming, double *residual, double *tangent, double *found)
+                       double beta, double gain, double *residual, double *tangent, double *found)
 {
     msfp_point point;
     msfp_work w;
     msfp_seed seed = { 0 };
     double g[NB][2], rest[MSFP_DOF];
-    const double factors[] = { cq, cv, ca, beta, warming };
+    const double factors[] = { cq, cv, ca, beta, gain };
     int status = point_of(bearing, at, &point);
     if (status == MSFP_OK && !msfp_all_finite(factors, sizeof factors / sizeof *factors))
         status = MSFP_E_FINITE;
@@ -152,8 +152,8 @@ int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, doubl
 #if MSFP_LAW
     memset(&w, 0, sizeof w);
 #endif
-#if MSFP_HEAT
-    point.warming = warming;
+#if MSFP_MEMORY
+    point.gain = gain;
 #endif
     point.foot_beta = beta;
     seed.cq = cq, seed.cv = cv, seed.ca = ca, seed.beta = beta;

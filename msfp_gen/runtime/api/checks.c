@@ -201,7 +201,7 @@ static int check_arrays(const msfp_scene *s, const char **message)
     for (int j = 0; s->f && j < NB; ++j)
         REQUIRE(s->f[2 * j] * s->f[2 * j] + s->f[2 * j + 1] * s->f[2 * j + 1] <= MSFP_LARGEST_FRICTION_STATE,
                 "f: friction does not exceed mu N; give Y^2 + Z^2 of at most 1");
-    REQUIRE(MSFP_HEAT || !s->heat, "heat: the friction of this model does not depend on temperature; leave it NULL");
+    REQUIRE(MSFP_MEMORY || !s->memory, "memory: the friction of this model depends on none of the surface; leave it NULL");
     return MSFP_OK;
 }
 
@@ -330,8 +330,8 @@ static int check_ends(const msfp_scene *s, const char **message)
                 && !s->sampled && !s->quasistatic,
             "stops, span_ends, output_step, stop_displacement, stop_all_rims, sampled, quasistatic: leave them as "
             "scene_default does");
-    REQUIRE(!s->v && !s->f && !s->foot && !s->heat && !s->origin && !s->monitor_heat,
-            "v, f, foot, heat, origin, monitor_heat: leave them out; a two-port starts at rest");
+    REQUIRE(!s->v && !s->f && !s->foot && !s->memory && !s->origin && !s->monitor_heat,
+            "v, f, foot, memory, origin, monitor_heat: leave them out; a two-port starts at rest");
     REQUIRE(centred(s->q), "q: give zero angles and finite separations; a two-port starts centred");
     return check_values(s, message);
 }

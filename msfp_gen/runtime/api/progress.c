@@ -36,8 +36,8 @@ void msfp_api_run_state(const msfp_run *run, msfp_run_state *state)
     if (state->f)
         give_friction(now->f, state->f);
     give(state->foot, now->foot, 2 * sizeof *now->foot);
-#if MSFP_HEAT
-    give(state->heat, now->heat, sizeof now->heat);
+#if MSFP_MEMORY
+    give(state->memory, now->memory, sizeof now->memory);
 #endif
     static const msfp_row none; /* for a run that failed before its first row */
     const msfp_row *last = run->row_count ? &run->rows[run->row_count - 1] : &none;

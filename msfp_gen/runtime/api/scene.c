@@ -66,7 +66,7 @@ msfp_options msfp_scene_options(const msfp_scene *s)
     o.start_time = s->start_time;
     o.origin = s->origin;
     o.foot = s->foot;
-    o.heat = s->heat;
+    o.memory = s->memory;
     copy_monitors(&o, s);
     return o;
 }
@@ -96,7 +96,7 @@ int msfp_api_run_new(const msfp_scene *scene, msfp_run **run, const char **messa
 #endif
     if (scene->monitor_heat)
         memcpy(made->monitor.heat, scene->monitor_heat, sizeof made->monitor.heat);
-    made->options.origin = made->options.foot = made->options.heat = NULL; /* need not outlive this call */
+    made->options.origin = made->options.foot = made->options.memory = NULL; /* need not outlive this call */
     made->identity = msfp_identity(scene);
     *run = made;
     return made->status;

@@ -207,9 +207,9 @@ int msfp_api_port_enter(msfp_port *port, const msfp_scene *state, const double *
     options.duration = state->start_time + 1.0;
     options.origin = state->origin;
     options.foot = state->foot;
-    options.heat = state->heat;
+    options.memory = state->memory;
     const int status = msfp_port_enter(port, &options, state->q, state->v, state->f, state->monitor_heat, ends);
-    port->committed.options.origin = port->committed.options.foot = port->committed.options.heat = NULL;
-    port->run.options.origin = port->run.options.foot = port->run.options.heat = NULL;
+    port->committed.options.origin = port->committed.options.foot = port->committed.options.memory = NULL;
+    port->run.options.origin = port->run.options.foot = port->run.options.memory = NULL;
     return status;
 }

@@ -19,9 +19,9 @@ enum {
     UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns: g, and mu where it follows a law */
     ROWS = MOMENT + UNKNOWNS + 1,   /* of the Jacobian of a contact: M, dY, dZ, mu, N */
     INPUTS = MSFP_LOCAL_SIZE,       /* force and slip rotation */
-    FLUX = MSFP_CONTACT_ROWS - MSFP_GRADIENTS * (MSFP_HEAT > 0) /* the row of the flux, where there is one */
+    SOURCE = MSFP_CONTACT_ROWS - MSFP_GRADIENTS * (MSFP_MEMORY > 0) /* the row of the source of a memory, where there is one */
 };
-#if MSFP_HEAT
+#if MSFP_MEMORY
 #define SLOPE(out, s)                                                                                                  \
     (out)[MSFP_CONTACT_LAW_MU * LANES + s] /* d mu/d mu by the law, because friction heats the surface */
 #else
@@ -239,9 +239,9 @@ MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
                 for (int s = 0; s < LANES; ++s)
                     a[r][c][s] -= factor[s] * a[k][c][s];
         }
-    /* Of the flux only gradients need derivatives (msfp_tangent_with_slopes). */
-    memset(condensed + FLUX * INPUTS * LANES, 0, (MSFP_CONTACT_ROWS - FLUX) * INPUTS * LANES * sizeof *condensed);
-    for (int r = 0; r < FLUX; ++r) {
+    /* Of the source of a memory only gradients need derivatives (msfp_tangent_with_slopes). */
+    memset(condensed + SOURCE * INPUTS * LANES, 0, (MSFP_CONTACT_ROWS - SOURCE) * INPUTS * LANES * sizeof *condensed);
+    for (int r = 0; r < SOURCE; ++r) {
         const double *row = jacobian + jacobian_row(r) * MSFP_LOCAL * LANES;
         for (int k = 0; k < INPUTS; ++k) {
             double *sum = condensed + (r * INPUTS + k) * LANES;

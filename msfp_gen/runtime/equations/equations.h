@@ -60,7 +60,7 @@ static inline int msfp_slider(int j)
 }
 
 /* What an evaluation is given: coordinates, motion of the base unless it is the same as in `w`, loads, friction and
- * temperatures. seed: NULL outside of a step. */
+ * memories. seed: NULL outside of a step. */
 void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                      msfp_blocks *s);
 /* The inertial frame at r_01 as the block of a body, the parent of body 0. */
@@ -164,23 +164,23 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
 /* Value and derivatives of a prescribed history at time t [s]: out [orders][6]. */
 void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
 
-/* ---- heat.c: nothing of it is compiled into models without heat ---- */
-#if MSFP_HEAT
-/* Temperatures of a stage with diagonal entry beta [s], for its evaluation, from what the earlier stages give; at beta = 0
+/* ---- memory.c: nothing of it is compiled into models whose friction remembers nothing ---- */
+#if MSFP_MEMORY
+/* Memories of a stage with diagonal entry beta [s], for its evaluation, from what the earlier stages give; at beta = 0
  * those of a state. */
-void msfp_heat_point(const msfp_state *from, double beta, msfp_point *at);
-/* Parts of the temperatures after the evaluation in `w`, and their rates, into `s`. */
-void msfp_heat_state(const msfp_work *w, const msfp_state *from, double beta, msfp_state *s);
-/* Largest error of a temperature over its tolerance [-]; error: its estimate, s: the end of the step. */
-double msfp_heat_error(const msfp_run *run, const msfp_state *error, const msfp_state *s, double beta);
+void msfp_memory_point(const msfp_state *from, double beta, msfp_point *at);
+/* Parts of the memories after the evaluation in `w`, and their rates, into `s`. */
+void msfp_memory_state(const msfp_work *w, const msfp_state *from, double beta, msfp_state *s);
+/* Largest error of a memory over its tolerance [-]; error: its estimate, s: the end of the step. */
+double msfp_memory_error(const msfp_run *run, const msfp_state *error, const msfp_state *s, double beta);
 #else
 /* In place of their prefixed names, see msfp_symbols.h. */
-#undef msfp_heat_point
-#undef msfp_heat_state
-#undef msfp_heat_error
-#define msfp_heat_point(from, beta, at) ((void)0)
-#define msfp_heat_state(w, from, beta, s) ((void)0)
-#define msfp_heat_error(run, error, s, beta) 0.0
+#undef msfp_memory_point
+#undef msfp_memory_state
+#undef msfp_memory_error
+#define msfp_memory_point(from, beta, at) ((void)0)
+#define msfp_memory_state(w, from, beta, s) ((void)0)
+#define msfp_memory_error(run, error, s, beta) 0.0
 #endif
 
 #endif

@@ -107,9 +107,9 @@ MSFP_WIDE void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, c
         for (int i = 0; i < MSFP_SHEAR_SIZE; ++i)
             before[MSFP_BEFORE_Y + i] = seed ? seed->fp[j][i] : at->f[j][i];
         before[MSFP_BEFORE_BETA] = seed ? seed->beta : 0.0;
-#if MSFP_HEAT
-        before[MSFP_BEFORE_RISE] = at->rise[j];
-        before[MSFP_BEFORE_WARMING] = at->warming;
+#if MSFP_MEMORY
+        before[MSFP_BEFORE_PAST] = at->past[j];
+        before[MSFP_BEFORE_GAIN] = at->gain;
 #endif
     }
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);

@@ -17,8 +17,8 @@ static void give_friction_rates(const msfp_blocks *s, msfp_work *w)
     for (int j = 0; j < NB; ++j) {
         memcpy(w->contact[j] + MSFP_CONTACT_DY, s->report_contact[j] + MSFP_REPORT_CONTACT_DY,
                FRICTION * sizeof(double));
-#if MSFP_HEAT
-        w->contact[j][MSFP_CONTACT_FLUX] = s->report_contact[j][MSFP_REPORT_CONTACT_FLUX];
+#if MSFP_MEMORY
+        w->contact[j][MSFP_CONTACT_SOURCE] = s->report_contact[j][MSFP_REPORT_CONTACT_SOURCE];
 #endif
     }
 }

@@ -122,8 +122,8 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
 #if MSFP_LAW
         row->mu[j] = contact[MSFP_CONTACT_MU];
 #endif
-#if MSFP_HEAT
-        row->temperature[j] = contact[MSFP_CONTACT_T];
+#if MSFP_MEMORY
+        row->MSFP_REMEMBERED[j] = contact[MSFP_CONTACT_MEMORY];
 #endif
     }
     memcpy(row->base, at->base[0], sizeof row->base);

@@ -148,9 +148,9 @@ MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp
     for (int j = 0; j < NB; ++j) {
         memcpy(ds.before[j] + MSFP_BEFORE_Y * C, dat->f[j], MSFP_SHEAR_SIZE * sizeof dat->f[j][0]);
         memcpy(ds.before[j] + MSFP_BEFORE_BETA * C, dat->beta, sizeof dat->beta);
-#if MSFP_HEAT
-        memcpy(ds.before[j] + MSFP_BEFORE_RISE * C, dat->rise[j], sizeof dat->rise[j]);
-        memcpy(ds.before[j] + MSFP_BEFORE_WARMING * C, dat->warming, sizeof dat->warming);
+#if MSFP_MEMORY
+        memcpy(ds.before[j] + MSFP_BEFORE_PAST * C, dat->past[j], sizeof dat->past[j]);
+        memcpy(ds.before[j] + MSFP_BEFORE_GAIN * C, dat->gain, sizeof dat->gain);
 #endif
     }
     msfp_forces_directions(p, dp, w, d, &s, &ds);

@@ -20,7 +20,7 @@ enum {
     RESULTS = MSFP_CONTACT_RESULTS,
     INPUTS = MSFP_CONTACT_INPUTS,  /* the unknowns come last */
     GIVEN = INPUTS - UNKNOWNS,
-    FEW = MSFP_HEAT ? RESULTS : MOMENT + UNKNOWNS /* results on which the motion depends; the flux is among the last */
+    FEW = MSFP_MEMORY ? RESULTS : MOMENT + UNKNOWNS /* results on which the motion depends; the source is among the last */
 };
 enum { PARAMETERS, STAGE, LOCAL }; /* blocks of inputs */
 static const struct {
@@ -129,8 +129,8 @@ int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, con
     for (int r = 0; r < RESULTS; ++r) {
         if (r < MOMENT + FRICTION)
             from[r < MOMENT ? r : r + 1] = r;
-#if MSFP_HEAT
-        if (result[r] == MSFP_CONTACT_FLUX)
+#if MSFP_MEMORY
+        if (result[r] == MSFP_CONTACT_SOURCE)
             from[MSFP_CONTACT_ROWS - 1] = r;
 #endif
     }

@@ -29,8 +29,8 @@ typedef struct {
     msfp_columns q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
     msfp_columns foot[2], foot_beta, beta;
     double slip[MSFP_NB][MSFP_SLIP_SIZE * MSFP_COLUMNS]; /* of a quasi-static step, instead of f */
-#if MSFP_HEAT
-    msfp_columns rise[MSFP_NB], warming;
+#if MSFP_MEMORY
+    msfp_columns past[MSFP_NB], gain;
 #endif
 #if MSFP_TOP_ROTATION
     msfp_columns support[2][6];
@@ -289,16 +289,16 @@ void msfp_step_columns(msfp_run *run, msfp_group *group);
 /* Complete the columns of the evaluation that ended the step. */
 void msfp_complete_columns(msfp_run *run, msfp_group *group);
 
-/* ---- heat_columns.c: temperatures of the surfaces, as the functions of heat.c without "columns" ---- */
-#if MSFP_HEAT
+/* ---- memory_columns.c: memories of the surfaces, as the functions of memory.c without "columns" ---- */
+#if MSFP_MEMORY
 /* Into `dat`, after its columns of beta. from: values and columns of what the earlier stages give. */
-void msfp_heat_point_columns(const msfp_state *from, const msfp_state_columns *dfrom, double beta,
+void msfp_memory_point_columns(const msfp_state *from, const msfp_state_columns *dfrom, double beta,
                              msfp_point_columns *dat);
-/* flux: columns of the heat flux of the surfaces; s: the values of the state. */
-void msfp_heat_state_columns(const msfp_state *s, const msfp_state_columns *dfrom, const msfp_columns flux[MSFP_NB],
+/* source: its columns, of all surfaces; s: the values of the state. */
+void msfp_memory_state_columns(const msfp_state *s, const msfp_state_columns *dfrom, const msfp_columns source[MSFP_NB],
                              double beta, const double *dbeta, msfp_state_columns *ds);
 #else
-#define msfp_heat_point_columns(from, dfrom, beta, dat) ((void)0)
+#define msfp_memory_point_columns(from, dfrom, beta, dat) ((void)0)
 #endif
 
 /* ---- observation.c, work_columns.c: works of the energy balance, where they are asked for ---- */

@@ -93,7 +93,7 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
     memcpy(dat->q, now->q, sizeof dat->q);
     memcpy(dat->v, now->v, sizeof dat->v);
     memcpy(dat->f, now->f, sizeof dat->f);
-    msfp_heat_point_columns(&run->now, now, 0.0, dat);
+    msfp_memory_point_columns(&run->now, now, 0.0, dat);
     msfp_inputs_columns(run, group, run->now.t, now->t, dat);
     if (first) {
         msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
@@ -112,12 +112,12 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
         msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
     }
     msfp_friction_columns(&group->work, now->df, NULL);
-#if MSFP_HEAT
+#if MSFP_MEMORY
     static const msfp_columns fixed;
-    msfp_columns flux[NB];
+    msfp_columns source[NB];
     for (int j = 0; j < NB; ++j)
-        memcpy(flux[j], group->work.contact[j] + MSFP_CONTACT_FLUX * C, sizeof flux[j]);
-    msfp_heat_state_columns(&run->now, now, (const msfp_columns *)flux, 0.0, fixed, now);
+        memcpy(source[j], group->work.contact[j] + MSFP_CONTACT_SOURCE * C, sizeof source[j]);
+    msfp_memory_state_columns(&run->now, now, (const msfp_columns *)source, 0.0, fixed, now);
 #endif
     memcpy(now->foot, group->work.foot + MSFP_FOOT_Y * C, sizeof now->foot);
     memcpy(now->dfoot, group->work.foot + MSFP_FOOT_Y1 * C, sizeof now->dfoot);

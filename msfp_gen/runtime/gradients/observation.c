@@ -170,8 +170,8 @@ MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns 
 #if MSFP_LAW
         row[MSFP_ROW_MU + j][c] = dcontact[MSFP_CONTACT_MU * C + c];
 #endif
-#if MSFP_HEAT
-        row[MSFP_ROW_TEMPERATURE + j][c] = dcontact[MSFP_CONTACT_T * C + c];
+#if MSFP_MEMORY
+        row[MSFP_ROW_REMEMBERED + j][c] = dcontact[MSFP_CONTACT_MEMORY * C + c];
 #endif
     }
     msfp_gap(p->surface[j], w->body[j + 1], sliding);

@@ -21,7 +21,7 @@ static void observed_columns(msfp_run *run, msfp_group *group, const msfp_observ
     memcpy(dat.a, ds->a, sizeof dat.a);
     memcpy(dat.f, ds->f, sizeof dat.f);
     memcpy(dat.foot, ds->foot, sizeof dat.foot);
-    msfp_heat_point_columns(s, ds, 0.0, &dat);
+    msfp_memory_point_columns(s, ds, 0.0, &dat);
     msfp_condensed_columns(p, &group->parameters, &o->at, &dat, &o->seed, &o->work, slopes, MSFP_OF_ROW, dw);
     msfp_record_columns(p, &group->parameters, &o->at, &dat, &o->work, dw, d);
     memcpy(d[MSFP_ROW_WORK], ds->work, sizeof ds->work);

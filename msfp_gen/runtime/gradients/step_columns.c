@@ -74,7 +74,7 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const msf
         dat->beta[c] = dat->foot_beta[c] = method->gamma * group->h[c];
         dat->foot[0][c] += beta * dat->foot[1][c] + dat->beta[c] * trail->stage[i].at.foot[1];
     }
-    msfp_heat_point_columns(&trail->stage[i].from, from, beta, dat);
+    msfp_memory_point_columns(&trail->stage[i].from, from, beta, dat);
 }
 
 /* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta, at stage i. */
@@ -172,13 +172,13 @@ MSFP_INLINE void stage_state(msfp_run *run, msfp_group *group, int i, const msfp
     msfp_foot_columns(&run->parameters, &group->parameters, &stage->at, dat, w, &group->work);
     memcpy(to->foot, group->work.foot + MSFP_FOOT_Y * C, sizeof to->foot);
     memcpy(to->dfoot, group->work.foot + MSFP_FOOT_Y1 * C, sizeof to->dfoot);
-#if MSFP_HEAT
-    msfp_columns flux[NB];
+#if MSFP_MEMORY
+    msfp_columns source[NB];
     for (int j = 0; j < NB; ++j) {
-        memcpy(flux[j], group->work.contact[j] + MSFP_CONTACT_FLUX * C, sizeof flux[j]);
-        add_rates(w->drates[j][MSFP_SHEAR_SIZE], x, flux[j]);
+        memcpy(source[j], group->work.contact[j] + MSFP_CONTACT_SOURCE * C, sizeof source[j]);
+        add_rates(w->drates[j][MSFP_SHEAR_SIZE], x, source[j]);
     }
-    msfp_heat_state_columns(&trail->state[i], from, (const msfp_columns *)flux, stage->beta, dat->beta, to);
+    msfp_memory_state_columns(&trail->state[i], from, (const msfp_columns *)source, stage->beta, dat->beta, to);
 #endif
     memcpy(to->work, from->work, sizeof to->work);
     memset(to->power, 0, sizeof to->power);

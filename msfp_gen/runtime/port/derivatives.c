@@ -118,20 +118,20 @@ static void point(const state_columns *known, double beta, state_columns *stage,
         }
 }
 
-#if MSFP_HEAT
-static const double decay[MSFP_HEAT] = MSFP_HEAT_RATES, weight[MSFP_HEAT] = MSFP_HEAT_WEIGHTS;
+#if MSFP_MEMORY
+static const double decay[MSFP_MEMORY] = MSFP_MEMORY_RATES, weight[MSFP_MEMORY] = MSFP_MEMORY_WEIGHTS;
 #endif
 
-/* What the stage formulas of friction, heat and foot know of the earlier stages. */
+/* What the stage formulas of friction, memory and foot know of the earlier stages. */
 static void known_of_stage(const state_columns *known, double beta, msfp_by_ends *d)
 {
     for (int j = 0; j < NB; ++j) {
         memcpy(d->before[j] + MSFP_BEFORE_Y * W, known->f[j], MSFP_SHEAR_SIZE * sizeof(columns));
-#if MSFP_HEAT
-        double *rise = d->before[j] + MSFP_BEFORE_RISE * W;
-        memset(rise, 0, sizeof(columns));
-        for (int i = 0; i < MSFP_HEAT * W; ++i)
-            rise[i % W] += known->heat[j][i / W][i % W] / (1.0 + beta * decay[i / W]);
+#if MSFP_MEMORY
+        double *past = d->before[j] + MSFP_BEFORE_PAST * W;
+        memset(past, 0, sizeof(columns));
+        for (int i = 0; i < MSFP_MEMORY * W; ++i)
+            past[i % W] += known->memory[j][i / W][i % W] / (1.0 + beta * decay[i / W]);
 #endif
     }
     for (int c = 0; c < W; ++c)
@@ -139,19 +139,19 @@ static void known_of_stage(const state_columns *known, double beta, msfp_by_ends
     memcpy(d->foot_stage + MSFP_FOOT_STAGE_Y1 * W, known->foot[1], sizeof(columns));
 }
 
-/* Y and Z, foot and temperatures of the solved stage, with their rates. */
+/* Y and Z, foot and memories of the solved stage, with their rates. */
 static void rest_of_stage(const state_columns *known, double beta, const msfp_by_ends *d, state_columns *stage)
 {
     memcpy(stage->f, known->f, sizeof stage->f);
     memcpy(stage->foot, known->foot, sizeof stage->foot);
     for (int j = 0; j < NB; ++j) {
         memcpy(stage->df[j], d->contact[j] + MSFP_CONTACT_DY * W, MSFP_SHEAR_SIZE * sizeof(columns));
-#if MSFP_HEAT
-        const double *flux = d->contact[j] + MSFP_CONTACT_FLUX * W;
-        for (int i = 0; i < MSFP_HEAT * W; ++i) {
-            stage->dheat[j][i / W][i % W] = (weight[i / W] * flux[i % W] - decay[i / W] * known->heat[j][i / W][i % W])
+#if MSFP_MEMORY
+        const double *source = d->contact[j] + MSFP_CONTACT_SOURCE * W;
+        for (int i = 0; i < MSFP_MEMORY * W; ++i) {
+            stage->dmemory[j][i / W][i % W] = (weight[i / W] * source[i % W] - decay[i / W] * known->memory[j][i / W][i % W])
                                             / (1.0 + beta * decay[i / W]);
-            stage->heat[j][i / W][i % W] = known->heat[j][i / W][i % W] + beta * stage->dheat[j][i / W][i % W];
+            stage->memory[j][i / W][i % W] = known->memory[j][i / W][i % W] + beta * stage->dmemory[j][i / W][i % W];
         }
 #endif
     }

@@ -74,7 +74,7 @@ struct msfp_port {
 msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
                          int loaded);
 void msfp_port_free(msfp_port *port);
-/* Continue in a port at rest from the state of a port of another model. options: start time, origin, foot and heat are
+/* Continue in a port at rest from the state of a port of another model. options: start time, origin, foot and memory are
  * those of that state, as q, v, f are; monitor_heat: as in a scene, NULL: none; ends [end][order][6]: their motion. */
 int msfp_port_enter(msfp_port *port, const msfp_options *options, const double *q, const double *v, const double *f,
                     const double *monitor_heat, const double *ends);

@@ -169,7 +169,7 @@ static void outside_law(const msfp_run *run, finding *found)
             outside(&found[MSFP_MONITOR_LAW_LOAD], contact[MSFP_CONTACT_N], o->law_load[j], j + 1);
 #if MSFP_HEAT
         if (o->monitors & 1 << MSFP_MONITOR_LAW_TEMPERATURE)
-            outside(&found[MSFP_MONITOR_LAW_TEMPERATURE], contact[MSFP_CONTACT_T], o->law_temperature, j + 1);
+            outside(&found[MSFP_MONITOR_LAW_TEMPERATURE], contact[MSFP_CONTACT_MEMORY], o->law_temperature, j + 1);
 #endif
     }
 }

@@ -34,7 +34,7 @@ static int solve_initial_state(msfp_run *run)
     if (status)
         return status;
     msfp_state_of(run, &at, at.f, &run->now);
-    msfp_heat_state(&run->work, &run->now, 0.0, &run->now);
+    msfp_memory_state(&run->work, &run->now, 0.0, &run->now);
     msfp_powers_of(run, &at, &run->now);
     msfp_energy_balance_begin(run, &at);
     memset(run->acceleration_slope, 0, sizeof run->acceleration_slope);
@@ -84,9 +84,9 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
     memcpy(run->now.v, v, sizeof run->now.v);
     memcpy(run->now.f, f, sizeof run->now.f);
     run->now.t = options->start_time;
-#if MSFP_HEAT
-    if (options->heat)
-        memcpy(run->now.heat, options->heat, sizeof run->now.heat);
+#if MSFP_MEMORY
+    if (options->memory)
+        memcpy(run->now.memory, options->memory, sizeof run->now.memory);
 #endif
     while (run->next_jump < jump_count && jumps[run->next_jump] <= run->now.t)
         ++run->next_jump;

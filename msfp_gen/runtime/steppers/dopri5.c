@@ -58,7 +58,7 @@ static void stage_point(msfp_run *run, const msfp_state *stages, int i, double h
     memcpy(at->v, from->v, sizeof at->v);
     memcpy(at->f, from->f, sizeof at->f);
     memcpy(at->foot, from->foot, sizeof at->foot);
-    msfp_heat_point(from, 0.0, at);
+    msfp_memory_point(from, 0.0, at);
 }
 
 /* Integrals of the energy balance by Simpson's rule: the power of a rim damper is a peak that lasts only a few
@@ -143,10 +143,10 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
         const int status = rates_at(run, &at, &k[i]);
         if (status)
             return status;
-        msfp_heat_state(&run->work, &from, 0.0, &k[i]);
+        msfp_memory_state(&run->work, &from, 0.0, &k[i]);
     }
     msfp_add_rates(&estimate, k, e, STAGES, h);
-    *error = fmax(msfp_error_norm(run, &estimate, 1), msfp_heat_error(run, &estimate, &k[STAGES - 1], 0.0));
+    *error = fmax(msfp_error_norm(run, &estimate, 1), msfp_memory_error(run, &estimate, &k[STAGES - 1], 0.0));
     if (*error <= 1.0)
         run->stability_limit_steps =
             at_stability_limit(&k[STAGES - 2], &k[STAGES - 1], h) ? run->stability_limit_steps + 1 : 0;

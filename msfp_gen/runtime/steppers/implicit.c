@@ -19,7 +19,7 @@ void msfp_stage_begin(msfp_run *run, msfp_stages *s, int i)
     s->now.at.foot[1] = from->foot[1];
     s->now.at.foot_beta = s->now.beta;
     s->now.seed.same_base = 0;
-    msfp_heat_point(from, s->now.beta, &s->now.at);
+    msfp_memory_point(from, s->now.beta, &s->now.at);
 }
 
 /* Rate j of body k at stage i, extrapolated from the earlier stages. */
@@ -119,7 +119,7 @@ void msfp_stage_end(msfp_run *run, msfp_stages *s, int i)
     stage->energy = 0.0; /* known once the step is accepted */
     msfp_state_of(run, &s->now.at, s->now.f, stage);
     msfp_powers_of(run, &s->now.at, stage);
-    msfp_heat_state(&run->work, &s->now.from, s->now.beta, stage);
+    msfp_memory_state(&run->work, &s->now.from, s->now.beta, stage);
     for (int e = 0; e < MSFP_WORKS; ++e)
         stage->work[e] = s->now.from.work[e] + s->h * s->method->gamma * stage->power[e];
     if (run->node_count < MSFP_NODES && i == s->method->nodes[run->node_count]) {
@@ -206,7 +206,7 @@ void msfp_stages_end(msfp_run *run, msfp_stages *s, double *error)
         for (int d = 0; d < NQ; ++d)
             run->acceleration_slope[k][d] = (next->a[k][d] - now->a[k][d]) / h;
     double other = fmax(s->other, msfp_friction_jump_error(now, next));
-    other = fmax(other, msfp_heat_error(run, &estimate, next, s->now.beta));
+    other = fmax(other, msfp_memory_error(run, &estimate, next, s->now.beta));
     *error = fmax(other, msfp_error_norm(run, &estimate, 0));
     refine_integrals(s, h, *error > 1.0, next->work);
 #if MSFP_GRADIENTS

@@ -111,7 +111,7 @@ void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
     memcpy(at->a, s->a, sizeof at->a);
     memcpy(at->f, s->f, sizeof at->f);
     memcpy(at->foot, s->foot, sizeof at->foot);
-    msfp_heat_point(s, 0.0, at);
+    msfp_memory_point(s, 0.0, at);
 }
 
 double msfp_absolute_tolerance(const msfp_run *run, int j, int d)

@@ -88,7 +88,7 @@ int main(void)
     SCENE(s.max_steps = NAN);
     SCENE(s.output_step = -1.0);
     SCENE(s.monitors = 1 << 30);
-    SCENE(s.heat = state);
+    SCENE(s.memory = state);
     state[3] = NAN;
     SCENE(s.q = state);
     memset(&at, 0, sizeof at);

@@ -289,7 +289,7 @@ def test_a_snapshot_is_read_by_a_run_of_its_scene_alone() -> None:
         change(scene, arrays)
         assert read(b, scene, buffer) == "snapshot", name
         seen.add(name.partition(".")[0].partition("[")[0])
-    structs = {"bearing", "support", "heat"}  # values of a bearing follow; the model has neither of the others
+    structs = {"bearing", "support", "memory"}  # values of a bearing follow; the model has neither of the others
     assert seen | structs == {name for name, _ in b.api.structs["msfp_scene"]._fields_}
     unused = {(k, name) for k in (0, 4) for name in ("rim_radius", "rim_offset")}  # the base and the plate meet no rim
     for table, names in ((b.bodies, contract.names(contract.BODY)), (b.surfaces, contract.names(contract.SURFACE))):

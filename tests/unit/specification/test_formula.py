@@ -41,7 +41,7 @@ def test_a_formula_of_the_greatest_depth_is_evaluated_far_down_a_program() -> No
     def below(calls: int) -> Any:
         if calls:
             return below(calls - 1)
-        return fold(tree, {"mu": 1.0}, FLOAT_OPERATIONS), units_of(tree, [])
+        return fold(tree, {"mu": 1.0}, FLOAT_OPERATIONS), units_of(tree, [], {})
 
     assert below(300) == (MAX_DEPTH, {})
 

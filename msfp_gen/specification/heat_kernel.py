@@ -11,9 +11,7 @@ LONGEST] under two conditions: none is negative, and the integral over [0, SHORT
 
 from __future__ import annotations
 
-from msfp_gen.specification.friction_laws import HEAT_TIMES
-
-SHORTEST, LONGEST = HEAT_TIMES
+SHORTEST, LONGEST = 1e-3, 1e3
 """Range of times over which the sum approximates the kernel [s]; heat older than LONGEST is neglected."""
 HEAT_ERROR = 1.8e-3
 """Bound of the relative error of the kernel in that range [-]."""
