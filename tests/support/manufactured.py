@@ -19,12 +19,12 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import BSpline, make_interp_spline
 
 from msfp_gen import Bearing, Effects, Top, build_model
-from msfp_gen.generator.heat import HEAT_KERNEL
 from msfp_gen.model.model import Model
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.scene import top as scene_top
 from msfp_gen.scene.friction_parameters import law_parameters
 from msfp_gen.scene.top import MassTop, is_sprung, load_values
+from msfp_gen.specification.heat_kernel import HEAT_KERNEL
 from support import Array
 
 LOAD = 1e5  # around which the sources are found, downwards [N]
@@ -118,7 +118,7 @@ class State:
     def more(self) -> dict[str, Array]:
         """Keywords of an evaluation."""
         given = {"foot": self.foot} if len(self.foot) else {}
-        return {**given, "rise": np.ascontiguousarray(self.heat.sum(axis=1))} if self.heated else given
+        return {**given, "memory": np.ascontiguousarray(self.heat.sum(axis=1))} if self.heated else given
 
 
 def missing(case: Case, t: float, state: State, sources: Array) -> tuple[Array, tuple[Any, ...]]:
@@ -317,7 +317,7 @@ def solve(case: Case) -> Solution:
     if is_sprung(case.top):
         start["foot"] = along[0].foot
     if along[0].heated:
-        start["heat"] = np.ascontiguousarray(along[0].heat)
+        start["memory"] = np.ascontiguousarray(along[0].heat)
         states["rise"] = np.array([state.heat.sum(axis=1) for state in along])
     return Solution((t, motion), (t, coefficients(load, t, 6)), support, start, t, states)
 
