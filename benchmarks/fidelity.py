@@ -1,7 +1,7 @@
 """What cheap models save in a study: `python benchmarks/fidelity.py`, the tables of docs/fidelity.md.
 
 A triple pendulum under a mass, with uncertain friction, azimuth and intensity, under synthetic records and the two bundled
-ones, none of which was used to choose anything. Every draw is run once by each model (`table`); estimates are then repeated
+ones, to which no number of the models is fitted. Every draw is run once by each model (`table`); estimates are then repeated
 with draws from this table, so that the truth is its mean and hundreds of repetitions cost nothing. Seconds are those of
 a core that the runs of the table took, and what a study adds to each. `--folder DIR` keeps the tables.
 """
@@ -284,7 +284,7 @@ def hospital(folder: Path) -> str:
     }  # fmt: skip
     goals = {"target": pick(0.1, 0.3), "pilot": 16, "models": ["backbone"]}
     found = estimate(study, folder, "peak_force", workers=1, threads=True, **goals)
-    return "\n".join(["\nhospital:", str(estimate_table(found)), *found.notes])
+    return "\n".join(["\nhospital:", estimate_table(found).text, *found.notes])
 
 
 def main() -> None:
