@@ -293,14 +293,14 @@ class BearingResult(OneBearing):
         """A bearing of a building, from 0."""
         scene, bearing = building.scene, building.scene.bearings[index].bearing
         base, wrench = building.support[:, index, 0], building.wrench[:, index, 1]
-        across = base - building.displacement @ scene.attachments[index, :3].T
+        across = base - building.displacement @ scene.attachments[index, :3].T  # both start at zero
         own = (slice(None), index, slice(bearing.layout.surfaces))
         rows = {name: getattr(building, name)[own] for name in (*OF_SURFACES, "normal_force")}
         rows["temperature"] = heated(bearing, rows["temperature"])
         history = BearingRows(
             time=building.time,
             base_displacement=base,
-            displacement=across - across[0],
+            displacement=across,
             top_force=-wrench[:, :3],
             top_moment=-wrench[:, 3:],
             gap=bearing.arrays()["capacity"] - rows["sliding"],

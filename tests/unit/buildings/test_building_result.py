@@ -282,6 +282,16 @@ def test_a_bearing_at_other_times():
     np.testing.assert_allclose(between.history.sliding[0], one.history.sliding[3:5].mean(axis=0), rtol=1e-12)
 
 
+def test_bearings_of_a_building_at_other_times_keep_their_displacement():
+    """It is that since the start of the run, not since the first of the times."""
+    building = pushed()
+    rows = [5, 9]
+    shown = at_times(building, building.time[rows])
+    for one, then in zip(building.bearings, shown.bearings, strict=True):
+        assert then.history.displacement == pytest.approx(one.history.displacement[rows], abs=1e-15)
+        assert np.abs(then.history.displacement[0]).max() > 1e-4
+
+
 def test_every_quantity_of_the_catalogue_is_in_a_pushed():
     cycles = preset_run("fenz-test2").characterise().envelope
     for run in (preset_run("fenz-test2"), pushed()):
