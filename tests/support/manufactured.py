@@ -3,7 +3,7 @@
 Angles q(t) of all bodies (with uplift also their separations) are given functions. At every time the residual of the
 condensed equations at q, its rates and its accelerations is a number of moments and forces that are missing; loads on
 the top plate and accelerations of the base are found that supply them. Both are inputs of any run. Friction, heat and
-the foot of a sprung mass have rates of their own, which are integrated along the given motion to 1e-13 (DOP853). A run
+the foot of a sprung mass have rates of their own, which are integrated along the given motion to 1e-12 (DOP853). A run
 with these inputs then has q(t) as its exact solution, and the error of a method is known.
 """
 
@@ -57,7 +57,7 @@ class Case:
 
     Attributes:
         path: of the coordinates, shape (n-1, 3 or 6) [rad], [m].
-        sources: which inputs supply what is missing, at least one for each coordinate.
+        sources: which inputs supply what is missing, one for each coordinate.
         friction: Y, Z of all surfaces at the start, as a share along the slip.
         base, support: paths of psi, theta, phi of the base and of psi, theta of the support of the top plate [rad].
         load: force and moment around which the sources are found, shape (6,) [N], [N m].
@@ -107,11 +107,8 @@ class State:
         self.heated = law is not None and law.depends_on_temperature
         sizes = (2 * b, 2 if is_sprung(case.top) else 0, len(HEAT_KERNEL) * b if self.heated else 0, 3, 3)
         parts = np.split(y, np.cumsum(sizes)[:-1])
-        self.f, self.foot, self.heat = (
-            np.ascontiguousarray(parts[0].reshape(b, 2)),
-            parts[1].copy(),
-            parts[2].reshape(b, -1),
-        )
+        self.f, self.foot = np.ascontiguousarray(parts[0].reshape(b, 2)), parts[1].copy()
+        self.heat = parts[2].reshape(b, -1)
         self.place, self.speed = parts[3], parts[4]
 
     @property
@@ -221,10 +218,9 @@ def rates(case: Case, supply: Sources, t: float, y: Array) -> Array:
     row, friction = observed(case, t, state, sources)
     given = dict(zip(case.sources, sources, strict=True))
     out = [friction.ravel()]
-    if is_sprung(case.top):
-        out.append(
-            np.array([state.foot[1], foot_acceleration(case, t, row)]) if isinstance(case.top, MassTop) else np.zeros(2)
-        )
+    if is_sprung(case.top):  # the end of the spring of a rig does not move
+        moves = isinstance(case.top, MassTop)
+        out.append(np.array([state.foot[1], foot_acceleration(case, t, row) if moves else 0.0]))
     if state.heated:
         kernel = np.array(HEAT_KERNEL)
         flux = np.array([heat_flux(case, row, index) for index in range(case.count)])
@@ -282,10 +278,9 @@ def coefficients(poly: BSpline, t: Array, channels: int) -> Array:
     factorial = 1.0
     for power in range(ORDER):
         factorial *= max(power, 1)
-        # the middle of a piece belongs to no other: the highest derivative jumps at a knot of the spline
-        out[:, :channels, power] = (
-            poly(t[:-1], nu=power) if power < ORDER - 1 else poly((t[:-1] + t[1:]) / 2, nu=power)
-        ) / factorial
+        # the highest derivative jumps at a knot of the spline; the middle of a piece belongs to no other
+        at = t[:-1] if power < ORDER - 1 else (t[:-1] + t[1:]) / 2
+        out[:, :channels, power] = poly(at, nu=power) / factorial
     return out
 
 

@@ -88,7 +88,8 @@ def uplift(name: str, separation: Array, ripple: Array, in_space: bool = True, *
     both = Path(start, slope, amplitude, RIPPLE, phase)
     effects = replace(SPATIAL if in_space else PLANAR, uplift=True)
     sources = ("F1", "F2", "F3", "M1", "M2") if in_space else ("F1", "F3", "M2")
-    return planar(name, bearing, effects=effects, path=both, sources=sources, steps=UPLIFT, **more)
+    given = {"effects": effects, "path": both, "sources": sources, "steps": UPLIFT, **more}
+    return planar(name, bearing, **given)
 
 
 def spin(name: str, word: str) -> Case:
@@ -139,9 +140,23 @@ def smooth() -> dict[str, Case]:
             **with_(SPATIAL, friction="custom", friction_law=LAW),
         ),
         uplift("uplift, closed, planar", [2e-4, 0.0, -0.05], [1e-4, 0.0, -0.005], in_space=False),
+        uplift(
+            "uplift, heaving base, planar",
+            [2e-4, 0.0, -0.05],
+            [1e-4, 0.0, -0.005],
+            in_space=False,
+            sources=("F1", "a3", "M2"),
+        ),
         uplift("uplift, closed", [2e-4, 1e-4, -0.05], [1e-4, 2e-4, -0.005]),
         uplift("uplift, on an edge", [0.03, 0.02, -0.05], [1e-3, 2e-3, -0.005]),
         uplift("uplift, open", [1e-3, 0.0, 5e-3], [1e-3, 1e-3, 1e-3], friction=0.0),
+        spatial(
+            "accelerated base",
+            sources=("a1", "a2", "M1", "M2"),
+            top=Top.mass(**MASS),
+            load=WEIGHT,
+            steps={**METHODS, "dopri5": (40, 60, 80)},  # the motion of the base is known to 1e-11
+        ),
         spatial("rotating base", base=Path(**turning)),
         spatial("rotating support of the top", support=Path(**turned), **with_(SPATIAL, top_rotation=True)),
         planar(

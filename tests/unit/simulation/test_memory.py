@@ -31,7 +31,7 @@ def test_rows_that_cannot_fit_are_refused_before_anything_runs(
 ) -> None:
     monkeypatch.setattr(memory, "available", lambda: 8e9)
     scene = scene_of("fenz-test2", output_step=1e-6)
-    words = r"output_step = 1e-06: 5\.6e\+07 rows need 256 GB of memory and 8 GB are available; give at least 3\.4e-05"
+    words = r"output_step = 1e-06: 5\.6e\+07 rows need 263 GB of memory and 8 GB are available; give at least 3\.4e-05"
     with pytest.raises(InputError, match=words):
         simulate(scene)
     monkeypatch.setattr("msfp_gen.cli.console.build", None)  # not even built
@@ -47,10 +47,10 @@ def test_a_longest_step_is_the_least_number_of_rows(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(memory, "available", lambda: 8e9)
     scene = scene_of("fenz-test2", solver={"max_step": 1e-6}, output_step=None)
     field, remedy = r"solver\.max_step = 1e-06: 5\.6e\+07 rows", "give an output_step of at least"
-    with pytest.raises(InputError, match=rf"{field} need 256 GB of memory .*; {remedy} 3\.4e-05"):
+    with pytest.raises(InputError, match=rf"{field} need 263 GB of memory .*; {remedy} 3\.4e-05"):
         simulate(scene)
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=8e9))
-    with pytest.raises(InputError, match=rf"{field} need 63\.9 GB on the disk of .*; {remedy} 8\.4e-06"):
+    with pytest.raises(InputError, match=rf"{field} need 65\.7 GB on the disk of .*; {remedy} 8\.6e-06"):
         simulate(scene, stream=tmp_path / "run.nc")
 
 
@@ -90,7 +90,7 @@ def test_a_rest_for_ever_ends_with_what_there_is(monkeypatch: pytest.MonkeyPatch
 def test_the_size_of_a_row_is_that_of_the_result() -> None:
     history = preset_run("fenz-test2").history
     numbers = sum(values.size for values in history.arrays().values()) // len(history.time) + len(history.energy)
-    others = 4 + 4 + 1  # friction coefficients, temperatures and the settlement, with other laws and tops
+    others = 3 * 4 + 1  # friction coefficients, temperatures, memories and the settlement, with other laws and tops
     assert memory.row_size(4) == 8 * (numbers + others)
 
 
