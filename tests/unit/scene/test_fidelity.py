@@ -114,9 +114,10 @@ def test_a_rigid_building_keeps_mass_weight_and_loads():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("word", ["rigid", "equivalent", "massless"])
-def test_levels_of_a_building(word):
-    changes = {"motion.duration": 6.0, "motion.scale": 0.5}
+@pytest.mark.parametrize(("word", "scale"), [("rigid", 0.5), ("massless", 0.5), ("equivalent", 1.5)])
+def test_levels_of_a_building(word, scale):
+    """The equivalent pendulum where the stack slides far beyond its yield displacement (docs/fidelity.md)."""
+    changes = {"motion.duration": 6.0, "motion.scale": scale}
     exact = simulate(changed_scene("hospital-clc", changes))
     run = simulate(changed_scene("hospital-clc", {**changes, "fidelity": word}))
     assert run.status == "ok" and "fidelity" in [note.kind for note in run.notes]
