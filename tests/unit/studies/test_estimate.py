@@ -81,6 +81,22 @@ def test_the_published_ratio_of_two_models():
     assert runs[1] / runs[0] == pytest.approx(np.sqrt(0.81 / (0.01 * 0.19)))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("correlations", [(1.0, 0.97, 0.9), (1.0, 0.995, 0.8), (1.0, 0.9)])
+def test_allocation_and_variance_are_those_of_mxmcpy(correlations):
+    """NASA's program, which needs PyTorch: pip install mxmcpy torch."""
+    optimizer = pytest.importorskip("mxmc").Optimizer
+    rho, spread = np.array(correlations), np.array([2.0, 1.5, 0.7])[: len(correlations)]
+    costs = np.array([100.0, 5.0, 1.0])[[0, *range(-len(rho) + 1, 0)]]
+    matrix = np.minimum.outer(rho, rho) / np.maximum.outer(rho, rho)  # the cheaper through the better ones
+    matrix[0], matrix[:, 0] = rho, rho
+    theirs = optimizer(costs, np.outer(spread, spread) * matrix).optimize("mfmc", target_cost=1e6)
+    variances = shares_of_variance(rho) * spread[0] ** 2
+    runs = optimal_runs(variances, costs, seconds=1e6)
+    assert theirs.allocation.get_number_of_samples_per_model() == pytest.approx(runs, abs=1.0)
+    assert theirs.variance == pytest.approx(variances @ (1 / runs), rel=1e-3)
+
+
 def test_the_chain_leaves_out_what_does_not_pay():
     costs = {"exact": 1.0, "massless": 0.5, "backbone": 0.01}
     assert best_chain({"exact": 1.0, "massless": 0.99999, "backbone": 0.9}, costs).models == (
