@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from shutil import rmtree
 from typing import Annotated, Any
 
 import numpy as np
@@ -218,7 +219,7 @@ def estimate(
     Raises
     ------
     InputError
-        Invalid input, or a target that the budget does not permit.
+        Invalid input, or a target that the budget does not permit, as the pilot shows: a new folder is removed again.
     RunError
         Workers died; the same call continues.
 
@@ -232,13 +233,19 @@ def estimate(
     assert question.quantity is not None
     scales, names = _scales(study, question)
     units = {column.name: column.unit for column in study.keep.columns()}
-    with pool_from(workers, threads, executor, dask, mpi) as pool:
-        runs = StudySource(study, Path(folder), question.quantity, levels, question.seed, pool, progress)
-        if scales is None:
-            unit = units[question.quantity]
-            unit = {"probability": "", "variance": f"({unit})^2" if unit else ""}.get(question.statistic, unit)
-            return replace(estimated(runs, question), unit=unit)
-        found = fragility_of(runs, question, scales, lambda draws: np.log(runs.draws.intensity(draws)))
+    begun = Path(folder).exists()
+    try:
+        with pool_from(workers, threads, executor, dask, mpi) as pool:
+            runs = StudySource(study, Path(folder), question.quantity, levels, question.seed, pool, progress)
+            if scales is None:
+                unit = units[question.quantity]
+                unit = {"probability": "", "variance": f"({unit})^2" if unit else ""}.get(question.statistic, unit)
+                return replace(estimated(runs, question), unit=unit)
+            found = fragility_of(runs, question, scales, lambda draws: np.log(runs.draws.intensity(draws)))
+    except _BudgetError:
+        if not begun:
+            rmtree(folder, ignore_errors=True)
+        raise
     return replace(found, unit=names)
 
 
@@ -443,10 +450,18 @@ def _absolute(question: Question, value: float) -> float:
     return question.target if absolute else question.target * abs(value)
 
 
+class _BudgetError(InputError):
+    """A target that the pilot shows to need more than the budget."""
+
+
 def _more(
     state: _State, question: Question, value: float, interval: tuple[float, float], moment: Moment, exact: int
 ) -> bool:
-    """Plan the next round; whether there is one. Raises InputError where the budget does not permit the target."""
+    """Plan the next round; whether there is one.
+
+    Raises _BudgetError where the pilot alone shows that the budget does not permit the target; later the estimate ends
+    with the budget, and a note says so.
+    """
     costs = np.array([state.source.cost(level) for level in state.chain])
     spent, _ = state.source.spent()
     half = (interval[1] - interval[0]) / 2
@@ -462,13 +477,14 @@ def _more(
         if moment.unseen:  # its variance falls with the square of the exact runs
             runs *= min(1.0, exact * half / (MARGIN * wanted) / runs[0])
         needed = float(runs @ costs)
-        if question.budget is not None and needed > question.budget:
-            raise InputError(
+        if question.budget is not None and needed > question.budget and exact <= state.pilot:
+            raise _BudgetError(
                 f"target = {question.target:g} needs about {needed:.3g} s, budget = {question.budget:g} s: give a "
-                f"target of {question.target * np.sqrt(needed / question.budget):.2g}, or the time; runs are kept"
+                f"target of {question.target * np.sqrt(needed / question.budget):.2g}, or the time"
             )
     else:
-        assert question.budget is not None
+        runs, needed = np.zeros(len(costs)), np.inf
+    if question.budget is not None and needed > question.budget:
         if spent > 0.95 * question.budget:
             return False
         runs = optimal_runs(variances, costs, seconds=question.budget)

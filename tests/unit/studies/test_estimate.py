@@ -326,6 +326,14 @@ def test_bad_input_is_one_line_and_writes_nothing(tmp_path, case):
     assert "\n" not in str(error.value) and not (tmp_path / "out").exists()
 
 
+def test_a_target_beyond_the_budget_leaves_no_folder(tmp_path):
+    """Its pilot is needed to know; a folder that was there before keeps its runs."""
+    goal = {"quantity": "peak_displacement", "target": "0.01 %", "pilot": 16, "budget": "1 s"}
+    with pytest.raises(InputError, match="budget = 1 s: give a target of") as error:
+        estimate(small_study(accuracy=goal), tmp_path / "out", threads=True)
+    assert "\n" not in str(error.value) and not (tmp_path / "out").exists()
+
+
 @pytest.mark.slow
 def test_an_estimate_on_dask_has_the_same_runs(tmp_path):
     distributed = pytest.importorskip("distributed")
