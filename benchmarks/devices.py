@@ -186,6 +186,15 @@ def figure(path: Path) -> None:
         whole.axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 0.1))
 
 
+def references(device: Device) -> tuple[tuple[str, str, str], ...]:
+    """What a run of a device is compared with: the column of `rows`, its source, and the kind of reference."""
+    return (
+        ("circles", "friction circles", "closed form"),
+        ("published", device.source, "formula"),
+        ("arms", f"{device.source}, with the arms of friction", "formula"),
+    )
+
+
 def rows(device: Device) -> list[dict[str, float]]:
     """Rows of the table of one device: u [m], and F/W by run, friction circles, and formula without and with arms."""
     result = run(device)

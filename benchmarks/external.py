@@ -373,11 +373,7 @@ def device_points() -> Iterator[Series]:
     """Single to quintuple pendulums pushed through all sliding regimes, at every displacement of docs/devices.md."""
     for device in devices.DEVICES:
         rows = devices.rows(device)
-        for column, source, kind in (
-            ("circles", "friction circles", "closed form"),
-            ("published", device.source, "formula"),
-            ("arms", f"{device.source}, with the arms of friction", "formula"),
-        ):
+        for column, source, kind in devices.references(device):
             points = [Point(f"{1e3 * row['u']:.0f} mm", row[column], row["run"]) for row in rows]
             yield Series(f"{device.title} pendulum", source, kind, "F/W", points)
 

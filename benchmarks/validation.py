@@ -131,11 +131,7 @@ def device_pushes() -> Iterator[Case]:
     """Single to quintuple pendulums, pushed through all sliding regimes."""
     for device in devices.DEVICES:
         found = devices.rows(device)
-        for column, source, kind in (
-            ("circles", "friction circles", "closed form"),
-            ("published", device.source, "formula"),
-            ("arms", f"{device.source}, with the arms of friction", "formula"),
-        ):
+        for column, source, kind in devices.references(device):
             worst = max(found, key=lambda at: abs(at["run"] / at[column] - 1))
             quantity = f"F/W at {worst['u'] * MILLI:.0f} mm, largest of {len(found)}"
             command = f"msfp-gen run {device.scene}"

@@ -34,7 +34,7 @@ class Memory:
         unit, powers: of the state, and its exponents of m, s, kg, K.
         source_unit: of its source; weight times source is a rate of the state.
         meaning: what it is.
-        source: formula of v, p, N and values of the surface.
+        source: formula of v, p, N and `values`.
         parts: (rate [1/s], weight) of each part.
         scale: the tolerance of the state is a hundredth of it and of the state itself at `rtol` = 1e-3.
         checked: (lowest, highest, number) of the values at which a law is checked.
@@ -63,7 +63,7 @@ class Memory:
     @cached_property
     def tree(self) -> ast.expr:
         """Syntax tree of the source."""
-        return parse(self.source, {"v", "p", "N", *self.values, *dict(self.parameters)})
+        return parse(self.source, {"v", "p", "N", *self.values})
 
 
 TEMPERATURE = Memory(
