@@ -285,6 +285,12 @@ SECTIONS: list[tuple[str, str, type]] = [
 
 # Keys that are no field of a part.
 EXTRA: dict[str, tuple[Rule, Any]] = {"friction_at": (Choice(("surface", "pivot")), "surface")}
+# Every table of the files of scenes and suites, by its path.
+TABLES = {
+    "bearing": schema.tables_of(schema.SCENE) | schema.tables_of(schema.SUITE),
+    "building": schema.tables_of(buildings.SCENE),
+}
+TABLES["bearing"][""] = schema.SCENE
 
 
 def meaning(path: str, key: str) -> str:
@@ -329,7 +335,7 @@ def section(title: str, path: str, kind: type) -> str:
     """One table of the page: the keys in the order of the schema, those that are required first."""
     rules = {name: (rule, default) for name, rule, default in ruled_fields(kind)}
     lines = [f"## {title}", "", "| key | takes | default | meaning |", "|---|---|---|---|"]
-    tables = buildings.TABLES if kind is BuildingScene or path.startswith("building") else schema._TABLES
+    tables = TABLES["building" if kind is BuildingScene or path.startswith("building") else "bearing"]
     path = path or ("" if kind is Scene else "building_scene")
     fields = tables["" if path == "building_scene" else path].model_fields
     for key in sorted(fields, key=lambda name: not fields[name].is_required()):

@@ -21,13 +21,17 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.file.changes import changed_table, keys_of
-from msfp_gen.scene.file.loader import bearing_from_table, effects_from_table, scene_from_table, scene_table
-from msfp_gen.scene.file.motion_tables import KINDS, Paths, located, paths_in, resolved, with_spectrum
+from msfp_gen.scene.file.loader import (
+    bearing_from_table,
+    effects_from_table,
+    scene_from_table,
+    scene_parts,
+    scene_table,
+)
+from msfp_gen.scene.file.motion_tables import KINDS, Paths, located, motion_from, paths_in, resolved, with_spectrum
 from msfp_gen.scene.file.schema import EFFECTS, MOTION, PARTS, model_of, rows_of, validate
-from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import FIDELITIES
-from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop
 
 Table = dict[str, Any]
@@ -77,7 +81,7 @@ _BUILDING = model_of(
     soil=(_SOIL, None),
     effects=(EFFECTS, None),
 )
-_SCENE = model_of(
+SCENE = model_of(
     BuildingScene,
     building=(_BUILDING, ...),
     bearings=(dict[str, Any], {}),
@@ -85,22 +89,6 @@ _SCENE = model_of(
     solver=(PARTS["solver"], None),
     limits=(PARTS["limits"], None),
 )
-TABLES = {
-    "": _SCENE,
-    "building": _BUILDING,
-    "building.base": _BASE,
-    "building.storey": _STOREY,
-    "building.node": _NODE,
-    "building.bearing": _BEARING,
-    "building.interface": _INTERFACE,
-    "building.soil": _SOIL,
-    "building.effects": PARTS["effects"],
-    "building.bearing.interface": _INTERFACE,
-    "building.bearing.soil": _SOIL,
-    "building.bearing.effects": PARTS["effects"],
-    "solver": PARTS["solver"],
-    "limits": PARTS["limits"],
-}
 _buildings: Kept[Building] = Kept(256 << 20, lambda building: 3 * building.mass.nbytes)
 MATRICES = paths_in(FrameTable)
 FILES = {"motion": paths_in(*KINDS.values()), "building": MATRICES}  # table -> its keys that are paths of files
@@ -114,20 +102,17 @@ def building_from_table(
 
     A `Scene` where the table has fidelity = "equivalent".
     """
-    still = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # valid, where a motion replaces it
-    given = validate(_SCENE, table if motion is None else {**table, "motion": still}, TABLES)
-    frame, named = given.pop("building"), given.pop("bearings", {})
-    shaking = given.pop("motion")
-    parts: Table = {"building": _building(frame, folder), "motion": motion or _motion(shaking, folder)}
-    parts |= {name: kind(**given.pop(name)) for name, kind in (("solver", Solver), ("limits", Limits)) if name in given}
+    parts, _ = scene_parts(SCENE, table, folder, motion)
+    frame, named = parts.pop("building"), parts.pop("bearings", {})
+    parts["building"] = _building(frame, folder)
     common = {name: frame[name] for name in COMMON if name in frame}
     made: dict[str, Bearing] = {}
     rows = enumerate(frame["bearing"])
     parts["bearings"] = [
         _bearing({**common, **row}, f"building.bearing[{index}]", named, folder, made) for index, row in rows
     ]
-    word = given.pop("fidelity", "exact")
-    return building_at_fidelity(BuildingScene(**given, **parts), word)
+    word = parts.pop("fidelity", "exact")
+    return building_at_fidelity(BuildingScene(**parts), word)
 
 
 def _building(given: Table, folder: Path | None) -> Building:
@@ -181,7 +166,7 @@ def _of_matrices(given: Table, options: Table) -> Building:
 def stored_bearing(row: Table, index: int) -> BuildingBearing:
     """A bearing of the table of a result file, complete and in SI units. Raises InputError."""
     path = f"bearing[{index}]"
-    return _bearing(validate(_BEARING, row, {"": _BEARING, "interface": _INTERFACE}), path, {}, None, {})
+    return _bearing(validate(_BEARING, row), path, {}, None, {})
 
 
 def _bearing(given: Table, path: str, named: Table, folder: Path | None, made: dict[str, Bearing]) -> BuildingBearing:
@@ -194,7 +179,7 @@ def _bearing(given: Table, path: str, named: Table, folder: Path | None, made: d
             values["effects"] = effects_from_table(values["effects"])
     if "motion" in values:
         with errors_at("motion", f"{path}.motion"):
-            values["motion"] = _motion(values["motion"], folder)
+            values["motion"] = motion_from(located(values["motion"], folder))
     with errors_at("top", f"{path}.interface"):
         values["interface"] = NodeTop(**values["interface"])
     with errors_at("soil", f"{path}.soil"):
@@ -218,11 +203,6 @@ def _values(given: Any, path: str, named: Table, made: dict[str, Bearing]) -> Be
     if isinstance(given, str):
         made[given] = bearing
     return bearing
-
-
-def _motion(given: Table, folder: Path | None) -> Motion:
-    values = located(given, folder)
-    return KINDS[values.pop("kind")](**values).build()
 
 
 AnyScene = Scene | BuildingScene

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +19,12 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.file import catalogue, schema
-from msfp_gen.scene.file.motion_tables import KINDS, LOADS, ROTATIONS, Pieces, history_from, located, table_of
+from msfp_gen.scene.file.motion_tables import LOADS, ROTATIONS, Pieces, history_from, located, motion_from, table_of
 from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.scene.solver import Solver
-from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
+from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, Top
 from msfp_gen.specification.layout import SELECTABLE, Auto, Effects, Layout
 
 Table = dict[str, Any]
@@ -33,7 +33,7 @@ _TOO_DEEP = "no valid TOML: tables or lists are nested too deeply; a scene needs
 _TOPS = {kind.kind: kind for kind in (RigTop, PrescribedTop, MassTop)}
 _ANY_MOTION: Table = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # valid, where a motion replaces it
 _complete: Kept[Table] = Kept(16, lambda _: 1)
-_PARTS = {"solver": Solver, "initial_state": InitialState, "stop": Stop, "limits": Limits}
+_FIELDS_ALONE = {"solver": Solver, "initial_state": InitialState, "stop": Stop, "limits": Limits}
 
 
 def scene_table(source: str | Path) -> tuple[Table, Path | None]:
@@ -93,23 +93,26 @@ def scene_from_table(
     folder: that of the scene file, to which paths in the table are relative; None: the working folder, and any path is
     permitted. motion: replaces the `[motion]` table; motion_table: that from which it was made. Raises InputError.
     """
-    valid = schema.validate_scene(table if motion is None else {**table, "motion": _ANY_MOTION})
-    motion_keys = located(valid["motion"], folder)
-    top = dict(valid["top"])
-    parts: Table = {name: kind(**valid.pop(name)) for name, kind in _PARTS.items() if name in valid}
-    if "effects" in valid:
-        parts["effects"] = effects_from_table(valid.pop("effects"))
-    for name, kinds in (("load", LOADS), ("top_rotation", ROTATIONS)):
-        if name in valid:
-            parts[name] = history_from(kinds, valid.pop(name), name)
+    parts, motion_keys = scene_parts(schema.SCENE, table, folder, motion)
     if parts.get("top_rotation") is not None and isinstance(parts.get("effects"), Effects):
         parts["effects"] = replace(parts["effects"], top_rotation=True)
-    parts["bearing"] = _bearing(valid["bearing"])
-    parts["top"] = _TOPS[top.pop("kind")](**top)
-    parts["motion"] = _motion(motion_keys) if motion is None else motion
-    word = valid.pop("fidelity", "exact")
-    scene = Scene(**{**valid, **parts, "motion_table": motion_keys if motion is None else motion_table})
+    word = parts.pop("fidelity", "exact")
+    scene = Scene(**parts, motion_table=motion_keys if motion is None else motion_table)
     return at_fidelity(scene, word)
+
+
+def scene_parts(
+    model: schema.Model, table: Mapping[str, Any], folder: Path | None, motion: Motion | None
+) -> tuple[Table, Table]:
+    """The parts of a scene, of one bearing or of a building, by name, and its `[motion]` table with absolute paths.
+
+    model: of its file. Other arguments and errors are those of `scene_from_table`. What is no part stays as validated.
+    """
+    valid = schema.validate(model, table if motion is None else {**table, "motion": _ANY_MOTION})
+    motion_keys = located(valid.pop("motion"), folder)
+    parts = {name: _PARTS[name](value) if name in _PARTS else value for name, value in valid.items()}
+    parts["motion"] = motion_from(motion_keys) if motion is None else motion
+    return parts, motion_keys
 
 
 def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
@@ -139,8 +142,7 @@ def complete_part(name: str, table: Mapping[str, Any]) -> Table:
     valid = schema.validate_part(name, table)
     if name == "solver":
         return dict(plain_values(plain_table(Solver(**valid))))
-    kind = valid.pop("kind")
-    return {"kind": kind, **plain_values(plain_table(_TOPS[kind](**valid)))}
+    return {"kind": valid["kind"], **plain_values(plain_table(_top(valid)))}
 
 
 def bearing_table(bearing: Bearing) -> Table:
@@ -159,7 +161,7 @@ def scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
     motion: table to write as `[motion]`; None: that of the scene's own motion; an empty table: `[motion]` is omitted.
     """
     values = {name: getattr(scene, name) for name in ("name", "duration", "output_step")}
-    tables = {name: getattr(scene, name) for name in ("effects", *_PARTS)}
+    tables = {name: getattr(scene, name) for name in ("effects", *_FIELDS_ALONE)}
     histories = {name: getattr(scene, name) for name in ("load", "top_rotation")}
     return dumps(
         {
@@ -204,14 +206,17 @@ def _row(kind: type, row: Mapping[str, Any], word: str, path: str) -> Any:
         return kind(**row)
 
 
-def _motion(table: Mapping[str, Any]) -> Motion:
-    values = dict(table)
-    return KINDS[values.pop("kind")](**values).build()
+def _of_fields(kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:
+    return kind(**table)
+
+
+def _top(table: Mapping[str, Any]) -> Top:
+    return _TOPS[table["kind"]](**{key: value for key, value in table.items() if key != "kind"})
 
 
 def _motion_table(scene: Scene) -> Table:
     """The `[motion]` table of the scene file if it still makes the scene's motion, else its polynomials."""
-    if scene.motion_table is not None and _motion(scene.motion_table) == scene.motion:
+    if scene.motion_table is not None and motion_from(scene.motion_table) == scene.motion:
         return {"kind": scene.motion_table["kind"], **scene.motion_table}
     return Pieces.of(scene.motion)
 
@@ -239,3 +244,14 @@ def plain_values(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain_values(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value
+
+
+# Table of a scene file -> what makes the part of its validated values.
+_PARTS: dict[str, Callable[[Table], Any]] = {
+    **{name: partial(_of_fields, kind) for name, kind in _FIELDS_ALONE.items()},
+    "bearing": _bearing,
+    "effects": effects_from_table,
+    "top": _top,
+    "load": lambda table: history_from(LOADS, table, "load"),
+    "top_rotation": lambda table: history_from(ROTATIONS, table, "top_rotation"),
+}

@@ -462,3 +462,8 @@ def _existing(file: str | None) -> Path:
 KINDS: dict[str, type[MotionTable]] = {
     kind.kind: kind for kind in (Harmonic, Circle, FigureEight, Ramp, RecordMotion, Arrays, Pieces)
 }
+
+
+def motion_from(table: Mapping[str, Any]) -> Motion:
+    """The motion of a validated `[motion]` table whose paths are absolute. Raises InputError."""
+    return KINDS[table["kind"]](**{key: value for key, value in table.items() if key != "kind"}).build()

@@ -6,12 +6,12 @@ plain tables in SI units with only the keys that the file gives, or raise one In
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING
-from functools import partial, reduce
+from functools import lru_cache, partial, reduce
 from operator import or_
 from types import GenericAlias
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
     BaseModel,
@@ -68,10 +68,10 @@ def _column(rule: Rule, value: object, *, text: bool) -> Any:
     return rule.parse(value, text=text)
 
 
-def _union(kinds: Iterable[Any]) -> tuple[Any, dict[str, Model]]:
-    """The union of the tables that their key `kind` distinguishes, and the model of each kind."""
-    models = {kind.kind: model_of(kind, kind=(Literal[kind.kind], ...), **_inner(kind)) for kind in kinds}
-    return Annotated[reduce(or_, models.values()), Field(discriminator="kind")], models
+def _union(kinds: Iterable[Any]) -> Any:
+    """The union of the tables that their key `kind` distinguishes."""
+    models = (model_of(kind, kind=(Literal[kind.kind], ...), **_inner(kind)) for kind in kinds)
+    return Annotated[reduce(or_, models), Field(discriminator="kind")]
 
 
 _SCALE_TO = model_of(ScaleTo)
@@ -124,10 +124,10 @@ _PRESET: Model = create_model(
     "PresetBearing", __base__=_Strict, preset=(_read(Text().parse), ...), friction_at=_FRICTION_AT, **_CHANGES
 )
 _EITHER = _bearing_union(_BEARING, _PRESET)
-_ROTATION, _ROTATIONS = _union(ROTATIONS.values())
-_LOAD, _LOADS = _union(LOADS.values())
-MOTION, _MOTIONS = _union(motion_tables.KINDS.values())
-_TOP, _TOPS = _union((RigTop, PrescribedTop, MassTop))
+_ROTATION = _union(ROTATIONS.values())
+_LOAD = _union(LOADS.values())
+MOTION = _union(motion_tables.KINDS.values())
+_TOP = _union((RigTop, PrescribedTop, MassTop))
 PARTS: dict[str, Model] = {
     name: model_of(kind)
     for name, kind in {
@@ -139,7 +139,7 @@ PARTS: dict[str, Model] = {
     }.items()
 }
 EFFECTS = _auto(PARTS["effects"])
-_SCENE = model_of(
+SCENE = model_of(
     Scene,
     bearing=(_EITHER, ...),
     motion=(MOTION, ...),
@@ -148,29 +148,12 @@ _SCENE = model_of(
     top_rotation=(_ROTATION, None),
     **{name: (EFFECTS if name == "effects" else model, None) for name, model in PARTS.items()},
 )
-# Every table by its path, union tags included: the known keys for messages about a misspelt or missing key.
-_TABLES: dict[str, Model] = {
-    "": _SCENE,
-    "bearing.full": _BEARING,
-    "bearing.full.layout": _LAYOUT,
-    "bearing.full.surfaces": _SURFACE,
-    "bearing.full.bodies": _BODY,
-    "bearing.preset": _PRESET,
-    **{f"motion.{kind}": model for kind, model in _MOTIONS.items()},
-    "motion.record.scale_to": _SCALE_TO,
-    **{f"top.{kind}": model for kind, model in _TOPS.items()},
-    **{f"load.{kind}": model for kind, model in _LOADS.items()},
-    **{f"top_rotation.{kind}": model for kind, model in _ROTATIONS.items()},
-    **{f"motion.{kind}.rotation.{turn}": model for kind in _MOTIONS for turn, model in _ROTATIONS.items()},
-    **PARTS,
-}
-_TAGGED = ("bearing", "motion", "top", "load", "top_rotation")
 _REMEDIES = {"list_type": "give a list of tables", "literal_error": "give one of the known words"}
 
 
 def validate_scene(table: Mapping[str, Any]) -> Table:
     """The table of a scene with its quantities in SI units and only the given keys; raises InputError of one line."""
-    return validate(_SCENE, table)
+    return validate(SCENE, table)
 
 
 def validate_part(name: str, table: Mapping[str, Any]) -> Table:
@@ -180,19 +163,18 @@ def validate_part(name: str, table: Mapping[str, Any]) -> Table:
 
 def validate_suite(table: Mapping[str, Any]) -> Table:
     """The same for the table of a suite of records: `records`, and `scale_to` with `least_share`."""
-    return validate(_SUITE, table)
+    return validate(SUITE, table)
 
 
 _SHARE = Annotated[Any, PlainValidator(partial(Quantity("", above=0.0).parse, text=True))]
 _SUITE_MOTION = model_of(motion_tables.RecordMotion, **_inner(motion_tables.RecordMotion))
 _SUITE_TARGET = model_of(ScaleTo, least_share=(_SHARE, None))
-_SUITE: Model = create_model(
+SUITE: Model = create_model(
     "Suite",
     __base__=_Strict,
     records=(rows_of(_SUITE_MOTION), ...),
     scale_to=(_SUITE_TARGET, None),
 )
-_TABLES |= {"records": _SUITE_MOTION, "records.scale_to": _SCALE_TO, "scale_to": _SUITE_TARGET}
 
 
 def _only(name: str, kind: Any) -> Model:
@@ -204,18 +186,36 @@ def _only(name: str, kind: Any) -> Model:
 _ONLY = {"bearing": _only("bearing", _EITHER), "top": _only("top", _TOP), "solver": _only("solver", PARTS["solver"])}
 
 
-def validate(model: Model, table: Mapping[str, Any], tables: Mapping[str, Model] | None = None) -> Table:
-    """The same for a table of a model, `tables`: every table in it by its path, for messages; None: of a scene."""
+def validate(model: Model, table: Mapping[str, Any]) -> Table:
+    """The table of a model, with its quantities in SI units and only the given keys; raises InputError of one line."""
     try:
         return _plain(model.model_validate(table))  # type: ignore[no-any-return]
     except ValidationError as error:
         details = error.errors(include_url=False)
     # A misspelt key is reported twice, as unknown and as missing: the report of the unknown key is more helpful.
     detail = min(details, key=lambda candidate: candidate["type"] != "extra_forbidden")
-    location = detail["loc"]
-    path = ".".join(part for part in location[:-1] if isinstance(part, str))
-    inner = (_TABLES if tables is None else tables).get(path, _Strict)
-    raise InputError(_one_line(inner, detail["type"], location, detail["input"], detail.get("ctx", {})))
+    raise InputError(_one_line(model, detail["type"], detail["loc"], detail["input"], detail.get("ctx", {})))
+
+
+@lru_cache(maxsize=64)
+def tables_of(model: Model) -> dict[str, Model]:
+    """Every table within a table by its path: of a union with the word of its kind, as in `motion.harmonic`."""
+    tables = {"": model}
+    for name, field in model.model_fields.items():
+        for word, inner in _models_in(field.annotation):
+            head = f"{name}.{word}" if word else name
+            tables |= {f"{head}.{path}" if path else head: table for path, table in tables_of(inner).items()}
+    return tables
+
+
+def _models_in(annotation: Any) -> Iterator[tuple[str, Model]]:
+    """The models in the annotation of a field; of a union with the words by which they are distinguished."""
+    tags = [item.tag for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Tag)]
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        kind = annotation.model_fields.get("kind")
+        yield ("" if kind is None else str(get_args(kind.annotation)[0])), annotation
+    for part in get_args(annotation):
+        yield from ((tags[0] if tags else word, model) for word, model in _models_in(part))
 
 
 def _plain(value: Any) -> Any:
@@ -225,28 +225,40 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, list) else value
 
 
-def _one_line(table: Model, kind: str, location: tuple[int | str, ...], value: Any, context: Mapping[str, Any]) -> str:
-    path, note = _path(location)
+def _one_line(model: Model, kind: str, location: tuple[int | str, ...], value: Any, context: Mapping[str, Any]) -> str:
+    tables, (path, note) = tables_of(model), _path(model, location)
+    key = str(location[-1])
+    table = tables.get(_joined(location[:-1]), _Strict)
     if kind == "extra_forbidden":
         known = list(table.model_fields)
-        hint = suggestion(str(location[-1]), known) or f"; the keys here are {', '.join(known)}"
+        hint = suggestion(key, known) or f"; the keys here are {', '.join(known)}"
         return f"{path}{note}: unknown key{hint}"
     if kind == "missing":
-        return f"{path}{note} is missing: {_remedy(table, str(location[-1]))}"
+        return f"{path}{note} is missing: {_remedy(table, key)}"
     if kind.startswith("union_tag") and isinstance(value, Mapping):
         fact = f"{path}.kind = {value['kind']!r}" if "kind" in value else f"{path}.kind is missing"
-        return f"{fact}: give one of {context.get('expected_tags') or _kinds(path)}"
+        kinds = ", ".join(repr(word) for word, _ in _models_in(table.model_fields[key].annotation))
+        return f"{fact}: give one of {kinds}"
     remedy = str(context["error"]) if "error" in context else _REMEDIES.get(kind, "give a table")
     remedy += " or the name of a preset" if path == "bearing" else ""
     return f"{path} = {_short(value)}{note}: {remedy}"
 
 
-def _path(location: tuple[int | str, ...]) -> tuple[str, str]:
+def _joined(location: Iterable[int | str]) -> str:
+    """The path in `tables_of` of a location: without places in lists."""
+    return ".".join(part for part in location if isinstance(part, str))
+
+
+def _path(model: Model, location: tuple[int | str, ...]) -> tuple[str, str]:
     """Path as in `bearing.surfaces[2].radius`, and the number of PEER 2017/07 as in ` (surface 3)`."""
-    parts = location[:1] + location[2:] if location[0] in _TAGGED else location
+    tables = tables_of(model)
+    # What follows a path that is no table is the word of a kind in a union.
+    parts = [
+        part for index, part in enumerate(location) if isinstance(part, int) or _joined(location[:index]) in tables
+    ]
     path = "".join(f"[{part}]" if isinstance(part, int) else f".{_key(part)}" for part in parts).lstrip(".")
     for name, word, first in (("surfaces", "surface", 1), ("bodies", "body", 2)):
-        if parts[1:2] == (name,) and len(parts) > 2:
+        if parts[1:2] == [name] and len(parts) > 2:
             return path, f" ({word} {int(parts[2]) + first})"
     return path, ""
 
@@ -254,10 +266,6 @@ def _path(location: tuple[int | str, ...]) -> tuple[str, str]:
 def _key(name: str) -> str:
     """A key for a message: in quotes where it is not a plain word."""
     return name if name.replace("-", "_").isidentifier() and len(name) <= 60 else _short(name)
-
-
-def _kinds(path: str) -> str:
-    return ", ".join(repr(kind) for kind in (_MOTIONS if path == "motion" else _TOPS))
 
 
 def _remedy(table: Model, name: str) -> str:

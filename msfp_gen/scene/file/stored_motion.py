@@ -17,7 +17,7 @@ from msfp_gen.common.fields import Notes
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import CHANNELS, Motion
 from msfp_gen.scene.file.loader import scene_text
-from msfp_gen.scene.file.motion_tables import KINDS, Pieces
+from msfp_gen.scene.file.motion_tables import Pieces, motion_from
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,7 +80,7 @@ def from_pieces(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Mot
 def _makes(table: Mapping[str, Any], motion: Motion) -> bool:
     """Whether a `[motion]` table makes this motion; not so where `dataclasses.replace` changed the scene's motion."""
     try:
-        return KINDS[table["kind"]](**{key: value for key, value in table.items() if key != "kind"}).build() == motion
+        return motion_from(table) == motion
     except InputError:  # its file no longer exists
         return False
 

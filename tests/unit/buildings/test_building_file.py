@@ -235,6 +235,15 @@ def table() -> dict:
             r"building\.bearing\[1\]\.soil\.mass = 20000: a foundation .* has no inertia; leave it out",
         ),
         ("building.soil", {"stiffness": 1e8}, r"building\.soil\.vertical_stiffness"),
+        *(
+            (f"{table}motion", motion, "^" + re.escape(f"{table.replace('.0', '[0]')}motion.{words}"))
+            for table in ("", "building.bearing.0.")
+            for motion, words in (
+                ({"kind": "harmonic", "amplitde": 0.1}, "amplitde: unknown key; did you mean 'amplitude'?"),
+                ({"kind": "harmonic"}, "amplitude is missing: give a finite number above 0 [m]"),
+                ({"kind": "ramp", "rotation": {"kind": "ramp", "angel": 1.0}}, "rotation.angel: unknown key"),
+            )
+        ),
     ],
 )
 def test_messages_name_the_field(path, value, message):
