@@ -154,16 +154,22 @@ def proportional(law: Law, bearing: Bearing) -> bool:
 
     A law with `friction_slow` must be proportional to both coefficients together.
     """
-    factor, scales = 1.25, []
-    for index, surface in enumerate(bearing.surfaces):
-        values, points = law_parameters(law, bearing, index), _grid(law)
-        scaled = values | {name: factor * values[name] for name in ("friction_slow",) if name in values}
-        base, raised = (
-            coefficient(law, {**parameters, **points, "mu": mu})[0]
-            for parameters, mu in ((values, surface.friction), (scaled, factor * surface.friction))
-        )
-        scales.append(np.allclose(raised, factor * base, rtol=1e-9, atol=0.0))
-    return all(scales)
+    return all(
+        _scales(law, surface.friction, tuple(law_parameters(law, bearing, index).items()))
+        for index, surface in enumerate(bearing.surfaces)
+    )
+
+
+@lru_cache(maxsize=256)
+def _scales(law: Law, friction: float, parameters: tuple[tuple[str, float], ...]) -> bool:
+    """Whether the coefficient of a law on one surface is multiplied by a factor with its reference coefficients."""
+    factor, values, points = 1.25, dict(parameters), _grid(law)
+    scaled = values | {name: factor * values[name] for name in ("friction_slow",) if name in values}
+    base, raised = (
+        coefficient(law, {**own, **points, "mu": mu})[0]
+        for own, mu in ((values, friction), (scaled, factor * friction))
+    )
+    return bool(np.allclose(raised, factor * base, rtol=1e-9, atol=0.0))
 
 
 def _grid(law: Law) -> dict[str, NDArray[np.float64]]:

@@ -13,6 +13,7 @@ import operator
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 Operations = Mapping[str, Callable[..., Any]]
@@ -75,6 +76,7 @@ def _depth(tree: ast.expr) -> int:
     return depth
 
 
+@lru_cache(maxsize=4096)
 def names_in(tree: ast.expr) -> frozenset[str]:
     """Names of quantities in a formula, without the names of functions."""
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}

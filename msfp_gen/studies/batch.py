@@ -139,8 +139,8 @@ def check_method(scene: AnyScene) -> None:
 
 
 def build_models(scenes: Iterable[AnyScene]) -> None:
-    """Build the models with which these scenes start, unless the cache of this host has them."""
-    for spec in dict.fromkeys(spec for scene in scenes for spec in scene.specs):
+    """Build the models with which these scenes start, unless the cache of this host has them; a backbone has none."""
+    for spec in dict.fromkeys(spec for scene in scenes if scene.fidelity != "backbone" for spec in scene.specs):
         build_model(spec.layout, spec.effects)
 
 

@@ -62,17 +62,23 @@ def optimal_runs(
     return np.asarray(ratios * seconds / float(np.sum(ratios * costs)))
 
 
-def factor_for(weights: Array, wanted: float) -> float:
-    """The factor with which chances in proportion to weights, at most 1, choose as many draws as wanted on average."""
+def factor_for(weights: Array, wanted: float, least: float = 0.0) -> float:
+    """The factor with which chances in proportion to weights choose as many draws as wanted on average.
+
+    Chances are at most 1. least: what is added to each of them.
+    """
     from scipy.optimize import brentq
 
-    if wanted <= 0 or not len(weights):
+    if wanted <= least * len(weights) or not len(weights):
         return 0.0
     most = float(1 / weights.min())
     if wanted >= len(weights):
         return most
-    found = brentq(lambda factor: float(np.minimum(factor * weights, 1.0).sum()) - wanted, 0.0, most, xtol=1e-12 * most)
-    return float(found)
+
+    def chosen(factor: float) -> float:
+        return float(np.minimum(factor * weights + least, 1.0).sum())
+
+    return float(brentq(lambda factor: chosen(factor) - wanted, 0.0, most, xtol=1e-12 * most))
 
 
 def best_chain(correlations: Mapping[str, float], costs: Mapping[str, float]) -> Chain:

@@ -55,6 +55,7 @@ MOST = 200_000  # draws
 MORE = 1.2  # exact runs planned for one more round, over those planned before, at least
 CHOSEN = 1.5  # exact runs at least, over those of the pilot
 LEAST_SHARE = 0.2  # time of the cheapest runs, over that of the others, at least: so a rare event is seen by them
+EQUAL = 0.25  # of the exact runs after the pilot: chosen with equal chances, whatever the prediction says
 CHEAP = 8  # cheap runs for each exact one in the pilot
 
 
@@ -279,6 +280,7 @@ class _State:
         self.chain: tuple[str, ...] = (EXACT,)
         self.count = self.pilot
         self.scale: dict[str, float] = {}
+        self.equal: dict[str, float] = {}
         self.planned = 0.0  # exact runs
         self.early: dict[str, int] = {}
         self.weights: Any = None
@@ -310,7 +312,8 @@ class _State:
         weights = self.weights(feature(last.values))
         chosen, least = [], np.zeros(self.count)
         for level in self.chain[:-1]:
-            least = np.maximum(least, np.minimum(self.scale.get(level, 0.0) * weights, 1.0))
+            own = self.scale.get(level, 0.0) * weights + self.equal.get(level, 0.0)
+            least = np.maximum(least, np.minimum(own, 1.0))
             chances = np.where(draws < self.pilot, 1.0, least)
             here = draws[self.uniform[: self.count] < chances]
             chosen.append(Runs(here, self.outcome(level, here), chances[here]))
@@ -338,8 +341,10 @@ class _State:
         weights = self.weights(values)[self.pilot :]
         self.planned = float(wanted[0])
         for level, number in zip(self.chain[:-1], wanted[:-1], strict=True):
-            more = factor_for(weights, float(number) - self.pilot)
-            self.scale[level] = max(self.scale.get(level, 0.0), more)
+            more = max(float(number) - self.pilot, 0.0)
+            equal = EQUAL * more / max(len(weights), 1)
+            self.equal[level] = max(self.equal.get(level, 0.0), min(equal, 1.0))
+            self.scale[level] = max(self.scale.get(level, 0.0), factor_for(weights, more, equal))
 
 
 def estimated(source: Source, question: Question) -> Estimate:

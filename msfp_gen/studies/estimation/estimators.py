@@ -243,7 +243,7 @@ def telescoped(
     own = [_variance(part, groups) for part in parts]
     variances = left * np.array([max(own[0], unseen), *own[1:]])
     variance = max(_variance(sum(parts, np.zeros(count)), groups) if population is None else 0.0, variances.sum())
-    freedom = np.maximum(np.array(ends) - 2.0, 1.0)
+    freedom = np.maximum(np.minimum(np.array(ends) - 2.0, [_freedom(part, groups) for part in parts]), 1.0)
     total = float(variance**2 / max(np.sum(variances**2 / freedom), 1e-300)) if variance > 0 else np.inf
     planned = variances * ends * variance / max(float(variances.sum()), 1e-300)
     value = float(np.mean(sum(parts, np.zeros(count))))
@@ -279,6 +279,18 @@ def _variance(contributions: Array, groups: Sequence[slice]) -> float:
     count = len(contributions)
     parts = [contributions[group] for group in groups]
     return float(sum(len(part) * part.var(ddof=1) for part in parts if len(part) > 1)) / count**2
+
+
+def _freedom(contributions: Array, groups: Sequence[slice]) -> float:
+    """Degrees of freedom of `_variance`: twice its square over its own variance (Satterthwaite, 1946).
+
+    The variance of a sample variance follows from the fourth moment: a few large contributions among many small ones
+    say little about the variance, which the number of runs alone does not tell.
+    """
+    parts = [contributions[group] for group in groups]
+    deviations = [(part - part.mean()) ** 2 for part in parts if len(part) > 1]
+    own = sum(float(((each - each.mean()) ** 2).sum()) for each in deviations)
+    return 2 * float(sum(each.sum() for each in deviations)) ** 2 / own if own > 0 else np.inf
 
 
 def exceeding(levels: Sequence[Runs], threshold: float, pilot: int, population: int | None = None) -> Moment:
