@@ -17,7 +17,7 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.run_any import simulate
 from msfp_gen.simulation.simulate import RunSequence
-from msfp_gen.studies.estimation.backbone_run import run_backbone
+from msfp_gen.studies.estimation.backbone_run import check_backbone, run_backbone
 from msfp_gen.studies.pool import SharedProgress, local_pool, raise_if_stopped, worker_count
 
 Proceed = Callable[[float, float], None]
@@ -133,8 +133,10 @@ def _completed(
 
 
 def check_method(scene: AnyScene) -> None:
-    """Raise InputError where the method of a scene does not support its effects; that of a building always does."""
-    if isinstance(scene, Scene) and scene.fidelity != "backbone":  # which selects no effects
+    """Raise InputError where the method, or the level "backbone", does not run a scene; that of a building runs any."""
+    if scene.fidelity == "backbone":  # which selects no effects
+        check_backbone(scene)
+    elif isinstance(scene, Scene):
         check(scene, scene.modelled)
 
 
