@@ -120,7 +120,7 @@ class Member:
 
     @property
     def entries(self) -> Array:
-        """Indices into the row of its model of the numbers that are kept; -1 where it has none, which counts as 0."""
+        """Indices into the row of its model of the numbers that are kept, shape (kept,); -1: none, it counts as 0."""
         row = [(name, tuple(shape)) for name, shape in self.model.extension.ROW]
         size = sum(int(np.prod(shape, dtype=int)) for _, shape in row)
         indices = parts(np.arange(size), row)
@@ -138,7 +138,7 @@ class Member:
 
     @property
     def work(self) -> Array:
-        """Integrals of its powers since its model began, at the committed state [J]."""
+        """Integrals of its powers since its model began, at the committed state, shape (works,), [J]."""
         found: Array = self.model.unpack(self.port.row)["work"]
         return found
 
@@ -169,7 +169,7 @@ class Run(AnyRun, Protocol):
 
     @property
     def peaks(self) -> Array:
-        """Peaks over all steps, one number after the other."""
+        """Peaks over all steps, one number after the other, shape (peaks,)."""
 
     def ends(self, bearing: int) -> Array:
         """Motion of the ends of a bearing, from 0, at the present state, shape (2, 3, 6)."""

@@ -129,7 +129,7 @@ class Columns(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """Matrices of an undamped frame, its floors from the base upwards, and its columns."""
+    """Matrices of an undamped frame, shape (n, n), SI, its floors from the base upwards, and its columns."""
 
     mass: Array
     stiffness: Array

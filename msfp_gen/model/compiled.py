@@ -28,7 +28,7 @@ class Stack(Protocol):
     def observe(
         self, q: Array, v: Array, a: Array, f: Array, base: Array, load: Array, **state: Array
     ) -> tuple[Array, Array, Array, int]:
-        """Row, powers, friction rates, and the surface that would have to transmit tension (0: none)."""
+        """Row, powers, friction rates, see `Stack`, and the surface that would have to transmit tension (0: none)."""
 
     def condensed(
         self,

@@ -22,7 +22,8 @@ Kind = Literal["angles", "pair_angles", "pair", "vector", "axial"]
 class State:
     """State, base motion and load as arguments of a compiled stack.
 
-    azimuth: of the E1 axis of their frame in the frame of the user [rad].
+    Shapes: q, v (n-1, 3) [rad], [rad/s]; f (n-1, 2); base (3, 6), displacements, velocities and accelerations with
+    rotations, SI; load (6,) [N], [N m]. azimuth: of the E1 axis of their frame in the frame of the user [rad].
     """
 
     q: Array

@@ -23,7 +23,7 @@ class Pieces(NamedTuple):
     """Data from which a motion is constructed.
 
     Attributes:
-        knots, coefficients: the polynomials.
+        knots, coefficients: the polynomials, shapes (k + 1,) [s] and (k, 6, 6), of `Motion`.
         max_step: longest step of a run that resolves them [s]; None: unknown.
         metadata: origin and parameters of the motion.
     """

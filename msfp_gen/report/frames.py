@@ -209,7 +209,7 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
 
 
 def building_rows(result: BuildingResult, count: int) -> Array:
-    """Rows of the view: evenly in time, with the peaks of displacement and axial force."""
+    """Rows of the view, shape (rows,): evenly in time, with the peaks of displacement and axial force."""
     time = result.time
     even = np.linspace(0, len(time) - 1, min(len(time), max(count, min(FEWEST, len(time)))))
     peaks = [int(bearing.history.horizontal.argmax()) for bearing in result.bearings]

@@ -88,7 +88,7 @@ class Extremes:
 
     @property
     def arrays(self) -> dict[str, Array]:
-        """What was recorded, by name."""
+        """What was recorded, by name; see `Extremes` for shapes and units."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         return {name: value for name, value in values.items() if value is not None}
 

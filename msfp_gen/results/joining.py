@@ -219,7 +219,7 @@ def at_times(result: R, times: ArrayLike) -> R:
 
 
 def checked_times(rows: Array, times: ArrayLike) -> Array:
-    """`times` as an array. Raises InputError for one outside of `rows`, the times of a run, increasing."""
+    """`times` as an array, shape (t,), [s]. Raises InputError for one outside of `rows`, the times of a run."""
     new_times = np.atleast_1d(np.asarray(times, dtype=float))
     inside = (new_times >= rows[0]) & (new_times <= rows[-1])
     if not np.all(inside):

@@ -149,7 +149,7 @@ class Backbone:
         return displacements[moved], rising[moved]
 
     def force(self, displacement: Array) -> Array:
-        """Force over load at displacements [m]; beyond the last rim it stays where rims are rigid."""
+        """Force over load at displacements [m], of their shape; beyond the last rim it stays where rims are rigid."""
         beyond = np.maximum(np.asarray(displacement) - self.capacity, 0.0)
         return np.asarray(np.interp(displacement, *self.points) + beyond * self.last_slope)
 

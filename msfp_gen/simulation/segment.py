@@ -63,7 +63,7 @@ class Segment:
 class Frame:
     """Base motion, load and top rotation of a scene in the frame of a model.
 
-    azimuth: of the E1 axis of the frame [rad]. wrench, rotation: coefficients of polynomials.
+    azimuth: of the E1 axis of the frame [rad]. wrench, rotation: coefficients of polynomials, shape (k, channels, 6).
     """
 
     azimuth: float

@@ -58,13 +58,13 @@ class Fit:
         return values[0], values[1]
 
     def probability(self, log_x: Array) -> Array:
-        """Phi(a + b ln x)."""
+        """Phi(a + b ln x), of the shape of `log_x`."""
         from scipy.special import ndtr
 
         return np.asarray(ndtr(self.coefficients[0] + self.coefficients[1] * log_x))
 
     def band(self, log_x: Array, level: float) -> tuple[Array, Array]:
-        """Pointwise confidence bounds of the probability, from those of a + b ln x."""
+        """Pointwise confidence bounds of the probability, each of the shape of `log_x`, from those of a + b ln x."""
         from scipy.special import ndtr, ndtri
 
         rows = np.stack([np.ones_like(log_x), log_x], axis=-1)
@@ -153,7 +153,7 @@ class DamageState:
         median_interval, dispersion_interval: their confidence intervals.
         runs, exceeded: numbers of runs that were used, and of those above the threshold.
         left_out: runs that ended early below the threshold.
-        intensity, runs_at, exceeded_at: by intensity: its value and the numbers of runs.
+        intensity, runs_at, exceeded_at: by intensity, shape (k,): its value and the numbers of runs.
         fit: the underlying fit, for curves and bands.
         samples: pairs (intercept, slope) of the bootstrap, ndarray, shape (bootstraps, 2); None without it.
         level: of confidence.
@@ -181,7 +181,7 @@ class DamageState:
         return self.fit.probability(np.log(intensity))
 
     def band(self, intensity: Array) -> tuple[Array, Array]:
-        """Lower and upper bound of the probability at each intensity, each at `level` of confidence."""
+        """Lower and upper bound of the probability, of the shape of `intensity`, each at `level` of confidence."""
         if self.samples is None:
             return self.fit.band(np.log(intensity), self.level)
         from scipy.special import ndtr

@@ -201,7 +201,7 @@ class Residuals:
 
     @property
     def scale(self) -> Array:
-        """Unit of each unknown: its value at the start, the largest force for offsets."""
+        """Unit of each unknown, shape (k,): its value at the start, the largest force for offsets [N]."""
         values = [abs(u.start) or max(abs(u.low), abs(u.high)) for u in self.unknowns]
         return np.array(values + [self.largest] * self.offsets)
 
@@ -226,7 +226,7 @@ class Residuals:
         return evaluation
 
     def split(self, rows: Array) -> list[Array]:
-        """Rows of all tests as those of each."""
+        """Rows of all tests, shape (N, ...), as those of each."""
         return np.split(rows, np.cumsum([len(test.time) for test in self.tests])[:-1])
 
     def _evaluate(self, values: Array, jacobian: Array | None) -> Evaluation:

@@ -155,7 +155,7 @@ def _elements(bearings: tuple[Bearing, ...], shares: tuple[float, ...], mass: fl
 
 
 def parallel(backbone: Backbone) -> tuple[Array, float, Array]:
-    """Elements (stiffness [1/m], strength), spring [1/m], and gaps (displacement [m], stiffness [1/m]) of a backbone.
+    """Elements (stiffness [1/m], strength), shape (2, k), spring [1/m], and gaps (displacement [m], stiffness [1/m]).
 
     Each element yields where the slope falls. Stiffness and strength are over the load. The last gap is that at which
     all sliders press on their rims.

@@ -51,7 +51,7 @@ class Moment:
         value: the estimate.
         variance: of it.
         freedom: degrees of freedom of the variance.
-        variances: that each level has to estimate, for `optimal_runs`, exact first.
+        variances: that each level has to estimate, shape (levels,), for `optimal_runs`, exact first.
         unseen: whether the variance is mostly that of errors of the prediction which no run showed; it falls with the
             square of the number of exact runs.
     """
@@ -192,7 +192,7 @@ def _newton(rows: Array, y: Array, offset: Array, start: Array, prior: Array) ->
 
 
 def feature(values: Array) -> Array:
-    """Values of a model as a prediction is fitted to them: a run that failed counts as the largest of the others."""
+    """Values of a model, shape (runs,), for the fit of a prediction: a run that failed is the largest of the others."""
     finite = values[np.isfinite(values)]
     most = float(finite.max()) if len(finite) else 0.0
     return np.where(np.isfinite(values), values, most)

@@ -135,7 +135,7 @@ class Study:
 
     @cached_property
     def cells(self) -> np.ndarray[Any, np.dtype[np.intp]] | None:
-        """The combination of values that each sample has, from 0; None: every sample has all of them."""
+        """The combination of values of each sample, from 0, shape (samples,); None: every sample has all of them."""
         cells = None if self.sampling is None else self.sampling.cells
         return None if cells is None else np.array(cells, dtype=np.intp) - 1
 
