@@ -11,6 +11,7 @@ from typing import Any
 import sympy as sp
 
 from msfp_gen.specification import friction_laws
+from msfp_gen.specification.spin import Spin
 
 from . import laws
 from .blocks import Blocks
@@ -20,8 +21,6 @@ from .program import Program, Vector
 from .vectors import add, combine, cross, dot, project, scale
 
 Symbols = dict[str, Any]
-SPIN_SMOOTHING = sp.Float("0.01")
-"""w_0 [rad/s] of the drilling moment (docs/model.md)."""
 ALIGNED = sp.Float("1e-9")
 """Sine of a tilt, and distance [m], below which the direction of a rim force is not resolved."""
 
@@ -37,12 +36,12 @@ class FrictionModel:
 
     Attributes:
         bouc_wen: name of the hysteresis law.
-        patch: whether a drilling moment of the contact patch resists spin.
+        drilling: what resists spin by a moment; None: nothing does.
         coefficient: friction law; None for a constant friction coefficient.
     """
 
     bouc_wen: str
-    patch: bool
+    drilling: Spin | None
     coefficient: friction_laws.Law | None = None
 
 
@@ -88,9 +87,9 @@ def friction(
     arm = p.let(signed_radius * par["mu"] * N)
     moment = add(scale(p.let(arm * g["Y"]), t2), scale(p.let(-arm * g["Z"]), t1))
     drill = sp.Integer(0)
-    if friction_model.patch:
+    if friction_model.drilling is not None:
         spin = p.let(dot(dw, t3))
-        size = p.let(-sp.Rational(2, 3) * par["mu"] * par["rs"] * N * spin / sp.sqrt(spin**2 + SPIN_SMOOTHING**2))
+        size = laws.drilling_moment(p, friction_model.drilling, par, N, spin)
         moment = add(moment, scale(size, t3))
         drill = p.let(size * spin)
     return {"M": p.let_vector(moment, "M"), "drill": drill}

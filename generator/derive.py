@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from msfp_gen.specification.layout import ModelSpec
 
@@ -52,10 +52,11 @@ def unknowns(spec: ModelSpec) -> tuple[str, ...]:
 def derive(spec: ModelSpec) -> Equations:
     """Derive the programs of one model. An effect that is off contributes neither fields nor statements."""
     effects = spec.effects
-    blocks = laws.add_law_fields(make_blocks(planar=effects.dimension == "planar", uplift=effects.uplift), effects.law)
-    values = parameters.value_blocks(effects, blocks.surface_parameters)
-    patch = effects.spin == "patch" and effects.dimension == "spatial"
-    law = contact.FrictionModel(effects.bouc_wen, patch, effects.law)
+    blocks = make_blocks(planar=effects.dimension == "planar", uplift=effects.uplift)
+    surface = laws.with_fields(blocks.surface_parameters, parameters.number_fields(effects))
+    blocks = laws.add_law_fields(replace(blocks, surface_parameters=surface), effects.law)
+    values = parameters.value_blocks(effects)
+    law = contact.FrictionModel(effects.bouc_wen, effects.drilling, effects.law)
     massless = effects.sliders == "massless"
     programs = [
         *parameters.programs(blocks, values, effects),

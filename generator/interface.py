@@ -8,7 +8,6 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.specification import contract, rows
-from msfp_gen.specification.friction_laws import NUMBERS
 from msfp_gen.specification.values import Value
 
 from . import declarations
@@ -46,9 +45,9 @@ def runtime_symbols() -> list[str]:
 
 
 def surface_values(spec: ModelSpec) -> list[Value]:
-    """The values of a surface in order, those of its friction law included."""
+    """The values of a surface in order, those of its friction law and drilling moment included."""
     known = {value.name: value for value in (*contract.SURFACE, *contract.SURFACE_UPLIFT)}
-    return [(known | NUMBERS)[name] for name in contract.surface_values(spec.effects)]
+    return [(known | contract.NUMBERS)[name] for name in contract.surface_values(spec.effects)]
 
 
 def effects_text(spec: ModelSpec) -> str:

@@ -15,7 +15,8 @@ from typing import Any
 import sympy as sp
 
 from msfp_gen.specification.formula import Operations, fold
-from msfp_gen.specification.friction_laws import NUMBERS, Law, Memory
+from msfp_gen.specification.friction_laws import Law, Memory
+from msfp_gen.specification.spin import Spin
 
 from .blocks import Blocks
 from .functions import Modulus, Step
@@ -43,10 +44,8 @@ def add_law_fields(b: Blocks, law: Law | None) -> Blocks:
     contact = with_fields(b.contact, [Field("mu", "-", "friction coefficient by its law")], before="N")
     slopes = [Field(f"law_{f.name}", "-", f"d mu/d{f.name} at constant N and slip") for f in b.friction.fields]
     contact = with_fields(contact, slopes)
-    numbers = [Field(value.name, value.unit, value.meaning) for value in map(NUMBERS.__getitem__, law.columns)]
     b = replace(
         b,
-        surface_parameters=with_fields(b.surface_parameters, numbers),
         coefficient=with_fields(
             Block("coefficient", (), {}), [Field("mu", "-", "friction coefficient, solved for with Y and Z")]
         ),
@@ -162,6 +161,11 @@ def law_variables(p: Program, law: Law, par: Symbols, N: sp.Expr, velocity: sp.E
 def coefficient(p: Program, law: Law, par: Symbols, variables: Symbols) -> sp.Expr:
     """Friction coefficient by the formula of the law; every operation becomes a statement."""
     return p.let(fold(law.tree, {**par, **variables}, operations(p)), "mu")
+
+
+def drilling_moment(p: Program, way: Spin, par: Symbols, N: sp.Expr, rate: sp.Expr) -> sp.Expr:
+    """Moment that resists spin at this rate, about the contact normal [N m]."""
+    return p.let(fold(way.tree, {**par, "r": par["rs"], "N": N, "w": rate}, operations(p)), "drilling")
 
 
 def start_of(memory: Memory, par: Symbols) -> sp.Expr:

@@ -42,9 +42,14 @@ class ValueBlocks:
     around: Block
 
 
-def value_blocks(effects: Effects, surface_parameters: Block) -> ValueBlocks:
-    """The values of a model; those of a surface end with the numbers of its friction law."""
-    law = () if effects.law is None else surface_parameters.fields[-len(effects.law.columns) :]
+def number_fields(effects: Effects) -> list[Field]:
+    """The fields of a surface for the numbers of its friction law and drilling moment."""
+    values = map(contract.NUMBERS.__getitem__, effects.surface_numbers)
+    return [Field(value.name, value.unit, value.meaning) for value in values]
+
+
+def value_blocks(effects: Effects) -> ValueBlocks:
+    """The values of a model; those of a surface end with the numbers of friction law and drilling moment."""
     surface = contract.SURFACE + (contract.SURFACE_UPLIFT if effects.uplift else ())
     gravity = Field("gravity", "m/s^2", "gravitational acceleration")
     sides = (
@@ -57,7 +62,7 @@ def value_blocks(effects: Effects, surface_parameters: Block) -> ValueBlocks:
     compliance = Field("compliance", "m/N", "of all unilateral contacts in series; 0 without uplift")
     return ValueBlocks(
         body_values=_values("body", contract.BODY),
-        surface_values=_values("surface", surface, law),
+        surface_values=_values("surface", surface, number_fields(effects)),
         top_values=_values("top", contract.TOP),
         sides=_block("sides", sides),
         side=_block("side", (Field("sign", "-", "+1 concave up, -1 concave down"),)),
@@ -120,8 +125,7 @@ def surface_block(b: Blocks, given: ValueBlocks, effects: Effects) -> Program:
         half = p.let(sp.asin(p.let(slider["rim_radius"] / v["radius"])) + friction)
         half = p.let(Select(WIDEST - half, half, WIDEST))
         values |= {"ks": v["seat_stiffness"], "cs": v["seat_damping"], "ca": sp.cos(half), "sa": sp.sin(half)}
-    law = effects.law
-    values |= {} if law is None else {name: v[name] for name in law.columns}
+    values |= {name: v[name] for name in effects.surface_numbers}
     p.write(b.surface_parameters, values, tangents=False)
     return p
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from msfp_gen.specification import contract
-from msfp_gen.specification.friction_laws import COEFFICIENTS
 from msfp_gen.specification.layout import ModelSpec
 
 GRAVITY = 9.8  # [m/s^2]
@@ -14,6 +13,7 @@ ACCELERATION, DURATION = 0.05, 2.0  # of the base along E1 [m/s^2], [s]: 0.1 m
 OUTPUT_STEP = 0.05  # [s]
 STROKE = 0.1  # of the upper end of a two-port [m]
 
+OTHER = 0.1  # numbers of friction laws and drilling moments that are not listed below
 _BASE = {"height": 0.05, "centroid": 0.025}
 _SLIDER = {
     "height": 0.06, "centroid": 0.03, "mass": 20.0, "inertia_transverse": 0.06, "inertia_axial": 0.1,
@@ -25,7 +25,7 @@ _SURFACE = {
     "contact_damping": 1e-4, "seat_stiffness": 5e10, "seat_damping": 10.0,
     "friction_slow": 0.03, "velocity_rate": 50.0, "velocity_drop": 0.5, "reference_pressure": 15e6,
     "pressure_ratio": 0.7, "temperature_ratio": 0.7, "area": 0.03, "reach": 0.1, "heating": 6.6e-5,
-    "start_temperature": 20.0, **dict.fromkeys(COEFFICIENTS, 0.1),
+    "start_temperature": 20.0,
 }  # fmt: skip
 _TOP = {"stiffness": 1e9, "damping": 1e4, "rotational_stiffness": 1e8, "rotational_damping": 1e4}
 _INTERFACE = _TOP | {"vertical_stiffness": 3e8, "vertical_damping": 1e5}
@@ -49,7 +49,7 @@ def example(spec: ModelSpec) -> Example:
     plate, base = _PLATE | (edge if spec.layout.p == 0 else {}), _BASE | (edge if spec.layout.m == 0 else {})
     return Example(
         [[values.get(name, 0.0) for name in body] for values in (base, *sliders, plate)],
-        [[(_SURFACE | {"friction": 0.05 + 0.01 * k})[name] for name in surface] for k in range(count)],
+        [[(_SURFACE | {"friction": 0.05 + 0.01 * k}).get(name, OTHER) for name in surface] for k in range(count)],
         # Over one surface the top plate must tilt: a rig that holds it level would hold the bearing.
         [0.0 if count == 1 and name.startswith("rotational") else _TOP.get(name, 0.0) for name in top],
     )

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
-from msfp_gen.scene.friction_parameters import law_parameters
+from msfp_gen.scene.friction_parameters import surface_numbers
 from msfp_gen.scene.seats import seat_stiffness
 from msfp_gen.scene.top import MassTop, Top, load_values
 from msfp_gen.specification import contract
@@ -84,9 +84,8 @@ def bodies_and_surfaces(bearing: Bearing, effects: Effects, top: Top | None = No
     arrays = bearing.arrays()
     if effects.uplift:
         arrays["seat_stiffness"] = seat_stiffness(bearing, top)
-    if (law := effects.law) is not None:
-        rows = [law_parameters(law, bearing, index) for index in range(bearing.layout.surfaces)]
-        arrays = {**arrays, **{name: np.array([row[name] for row in rows]) for name in law.columns}}
+    rows = [surface_numbers(effects, bearing, index) for index in range(bearing.layout.surfaces)]
+    arrays |= {name: np.array([row[name] for row in rows]) for name in effects.surface_numbers}
     bodies, surfaces = (
         np.ascontiguousarray(np.column_stack([arrays[name] for name in columns]))
         for columns in (contract.names(contract.BODY), contract.surface_values(effects))

@@ -73,7 +73,7 @@ class Model:
         """
         if bearing.layout != self.layout:
             raise InputError(f"bearing.layout = {bearing.layout.name}: this model is for {self.layout.name}")
-        check_bearing(self.effects.law, self.effects.friction, bearing)
+        check_bearing(self.effects.law, self.effects.friction, self.effects.spin, bearing)
         values = bodies_and_surfaces(bearing, self.effects, top)
         stack: Stack = self.extension.Stack(bearing.gravity, *values, top_values(top, anchor))
         return stack

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from msfp_gen.common.fields import check_fields, errors_at, paired, require_type
 from msfp_gen.errors import InputError
 from msfp_gen.specification import contract
-from msfp_gen.specification.friction_laws import NUMBERS
 from msfp_gen.specification.layout import Layout
 from msfp_gen.specification.values import Bound, rules
 
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.top import NodeTop
 
 _BODY = rules(contract.BODY)
-_SURFACE = rules((*contract.SURFACE, *contract.SURFACE_UPLIFT, *NUMBERS.values()))
+_SURFACE = rules((*contract.SURFACE, *contract.SURFACE_UPLIFT, *contract.NUMBERS.values()))
 
 
 @dataclass(frozen=True)
@@ -40,8 +39,8 @@ class Surface:
     seat_stiffness [N/m], seat_damping [s/m]: k and c of the unilateral contact of models with uplift, whose force is
     k s (1 + c ds/dt) at compression s (docs/uplift.md); k = None: `seats.seat_stiffness`. contact_damping: T [s];
     friction is mu N (Y + T dY/dt) in place of mu N Y (docs/hysteresis.md). The remaining fields are parameters of
-    friction laws (docs/friction.md): each is given if, and only if, the law of `Effects.friction` has it. Raises
-    InputError.
+    friction laws (docs/friction.md) and of drilling moments: each is given if, and only if, the law of
+    `Effects.friction` or the moment of `Effects.spin` has it. Raises InputError.
     """
 
     radius: Annotated[float, _SURFACE["radius"]]

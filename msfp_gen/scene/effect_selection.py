@@ -235,7 +235,7 @@ def _requires_inertia(scene: SceneFields, others: Effects, plane_until: float) -
     """Why sliders of any mass need inertia; empty where quasi-static steps apply, which do without it."""
     reasons = {
         "a separated body moves by its inertia": others.uplift,
-        "free spin is determined by inertia": others.spin == "free",
+        "free spin is determined by inertia": not others.determines_spin,
         "the explicit method integrates accelerations": scene.solver.method == "dopri5",
         "quasi-static steps need motion in one vertical plane": others.dimension != "planar" or plane_until < scene.end,
         "its limits are for a base that only translates, and for vertical loads": turned_or_pushed(scene),

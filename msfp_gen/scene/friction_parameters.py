@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from math import log, pi, sqrt
 from typing import TYPE_CHECKING, Any
@@ -13,9 +13,12 @@ from numpy.typing import NDArray
 from msfp_gen.errors import InputError
 from msfp_gen.specification.formula import Operations, fold, names_in
 from msfp_gen.specification.friction_laws import BUILT_IN, HEAT, MEMORIES, VARIABLES, Law, law_parameter_names
+from msfp_gen.specification.spin import NUMBERS as MOMENT_NUMBERS
+from msfp_gen.specification.spin import SPIN
 
 if TYPE_CHECKING:
-    from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.scene.bearing import Bearing, Surface
+    from msfp_gen.specification.layout import Effects
 
 # Range of every variable over which a law is checked: v [m/s], p [Pa], N [N], and of the memories.
 RANGES: dict[str, NDArray[np.float64]] = {
@@ -81,22 +84,20 @@ def coefficient(law: Law, values: Mapping[str, Any], by: str = "") -> Dual:
     return np.broadcast_to(mu, shape), np.broadcast_to(slope, shape)
 
 
-def check_bearing(law: Law | None, word: str, bearing: Bearing) -> None:
+def check_bearing(law: Law | None, word: str, spin: str, bearing: Bearing) -> None:
     """Check the friction parameters of a bearing.
 
-    Raises InputError where a surface lacks a parameter of the law, has one of another law, or where the law is not
-    valid with its parameters. law: None for constant friction. word: that of `Effects.friction`.
+    Raises InputError where a surface lacks a parameter of the law or of the drilling moment, has one of another, or
+    where the law is not valid with its parameters. law: None for constant friction. word, spin: those of
+    `Effects.friction` and `Effects.spin`.
     """
-    takes = set() if law is None else {*law.parameters, *law.also_accepted}
+    laws = {other.word: {*other.parameters, *other.also_accepted} for other in BUILT_IN.values()}
+    laws |= {word: set() if law is None else {*law.parameters, *law.also_accepted}}
+    moments = {name: set(way.values) for name, way in SPIN.items()}
     for index, surface in enumerate(bearing.surfaces):
-        for name in law_parameter_names():
-            if name not in takes and getattr(surface, name) is not None:
-                words = [other.word for other in BUILT_IN.values() if name in {*other.parameters, *other.also_accepted}]
-                users = " or ".join(map(repr, words)) or "'custom'"
-                raise InputError(
-                    f"bearing.surfaces[{index}].{name} = {getattr(surface, name)} (surface {index + 1}): "
-                    f"effects.friction = {word!r} has no such parameter; leave it out or give {users}"
-                )
+        _check_takers(surface, index, law_parameter_names(), f"effects.friction = {word!r}", laws[word], laws)
+        _check_takers(surface, index, MOMENT_NUMBERS, f"effects.spin = {spin!r}", moments[spin], moments)
+        _drilling_numbers(spin, surface, index)
         if law is not None:
             defect = _defect(law, (("mu", surface.friction), *law_parameters(law, bearing, index).items()))
             if defect is not None:
@@ -104,6 +105,38 @@ def check_bearing(law: Law | None, word: str, bearing: Bearing) -> None:
                     f"bearing.surfaces[{index}] (surface {index + 1}): the law of effects.friction = "
                     f"{law.word!r} {defect}"
                 )
+
+
+def _check_takers(
+    surface: Surface, index: int, names: Iterable[str], chosen: str, takes: set[str], takers: Mapping[str, set[str]]
+) -> None:
+    """Raise InputError where a surface has one of these numbers, which what is `chosen` does not take."""
+    for name in names:
+        if name not in takes and getattr(surface, name) is not None:
+            users = " or ".join(repr(word) for word, others in takers.items() if name in others) or "'custom'"
+            raise InputError(
+                f"bearing.surfaces[{index}].{name} = {getattr(surface, name)} (surface {index + 1}): "
+                f"{chosen} has no such parameter; leave it out or give {users}"
+            )
+
+
+def _drilling_numbers(spin: str, surface: Surface, index: int) -> dict[str, float]:
+    """Numbers of the drilling moment on one surface. Raises InputError where one is missing."""
+    for name in SPIN[spin].values:
+        if getattr(surface, name) is None:
+            raise InputError(
+                f"bearing.surfaces[{index}].{name} is missing (surface {index + 1}): effects.spin = {spin!r} needs it"
+            )
+    return {name: getattr(surface, name) for name in SPIN[spin].values}
+
+
+def surface_numbers(effects: Effects, bearing: Bearing, index: int) -> dict[str, float]:
+    """Numbers of friction law and drilling moment on one surface (index from 0), by name.
+
+    Raises InputError where one without a default is missing.
+    """
+    law = {} if effects.law is None else law_parameters(effects.law, bearing, index)
+    return law | _drilling_numbers(effects.spin, bearing.surfaces[index], index)
 
 
 def law_parameters(law: Law, bearing: Bearing, index: int) -> dict[str, float]:

@@ -48,7 +48,7 @@ class Scene(SceneFields):
         self._check_times()
         self._check_sizes()
         word, law = self.law
-        check_bearing(law, word, self.bearing)
+        check_bearing(law, word, self.effects.spin, self.bearing)
         check_seats(self.bearing, self.top, self.effects)
         if standing := standing_of(self):
             check_standing(*standing)

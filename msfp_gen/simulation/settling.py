@@ -15,6 +15,7 @@ from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.scene.scene_fields import InitialState
 from msfp_gen.scene.solver import Solver
 from msfp_gen.specification.layout import Auto
+from msfp_gen.specification.spin import SPIN
 
 if TYPE_CHECKING:
     from msfp_gen.results.gradient import Gradients
@@ -59,7 +60,7 @@ def settling_scene(scene: Scene) -> Scene:
 def _effects(scene: Scene) -> Auto:
     """Rims and friction law as given in the scene; the other effects are selected for the slow tilting."""
     given = scene.effects
-    spin = "locked" if given.spin == "free" else given.spin
+    spin = given.spin if SPIN[given.spin].moment else "locked"
     return Auto(
         rims=given.rims,
         spin=spin,

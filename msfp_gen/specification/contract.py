@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msfp_gen.common.fields import Quantity
+from msfp_gen.specification import friction_laws, spin
 from msfp_gen.specification.values import Array, Bound, Value
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ _INERTIA = Quantity("kg m^2", above=0.0)
 _TIME = Quantity("s", above=0.0)
 _STIFFNESS, _DAMPING = Quantity("N/m", least=0.0), Quantity("N s/m", least=0.0)
 
+NUMBERS = friction_laws.NUMBERS | spin.NUMBERS
+"""Every number of a surface that a friction law or a drilling moment may need, and every value derived from them."""
 GRAVITY = Value("gravity", Quantity("m/s^2", least=0.0), "gravity")
 BODY = (  # of each body, the base first
     Value("height", _LENGTH, "height l"),
@@ -149,9 +152,9 @@ MAX_ROWS = 1e8  # output rows of a run; about 100 GB
 
 
 def surface_values(effects: Effects) -> tuple[str, ...]:
-    """Names of the values of a surface in order: the numbers of a friction law come last."""
+    """Names of the values of a surface in order: the numbers of friction law and drilling moment come last."""
     uplift = SURFACE_UPLIFT if effects.uplift else ()
-    return (*(value.name for value in SURFACE + uplift), *(() if effects.law is None else effects.law.columns))
+    return (*(value.name for value in SURFACE + uplift), *effects.surface_numbers)
 
 
 @dataclass(frozen=True)

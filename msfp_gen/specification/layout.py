@@ -13,6 +13,7 @@ from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.errors import InputError
 from msfp_gen.specification.friction_laws import FRICTION, Law, law_of
 from msfp_gen.specification.hysteresis import HYSTERESIS, has_closed_form
+from msfp_gen.specification.spin import SPIN, Spin
 
 _COUNT = Quantity("", least=0, whole=True)
 
@@ -90,16 +91,7 @@ class Effects:
             }
         ),
     ] = "spatial"
-    spin: Annotated[
-        Literal["locked", "patch", "free"],
-        Choice(
-            {
-                "locked": "bodies do not turn about their own axis",
-                "patch": "a drilling moment over the contact patch resists spin",
-                "free": "no moment resists spin, as in PEER 2017/07",
-            }
-        ),
-    ] = "locked"
+    spin: Annotated[str, Choice({word: way.meaning for word, way in SPIN.items()})] = "locked"
     sliders: Annotated[
         Literal["inertial", "massless"],
         Choice(
@@ -147,10 +139,11 @@ class Effects:
             object.__setattr__(self, "friction_law", self.law.text)
         else:
             law_of(self.friction, self.friction_law)
-        if self.sliders == "massless" and self.spin == "free":
+        if self.sliders == "massless" and not self.determines_spin:
+            words = " or ".join(repr(word) for word, way in SPIN.items() if way.locked or way.moment)
             raise InputError(
-                "effects.spin = 'free' with effects.sliders = 'massless': nothing determines the spin of a body "
-                "without inertia; give spin = 'locked' or 'patch'"
+                f"effects.spin = {self.spin!r} with effects.sliders = 'massless': nothing determines the spin of a "
+                f"body without inertia; give spin = {words}"
             )
         if self.sliders == "massless" and self.uplift:
             raise InputError(
@@ -162,6 +155,23 @@ class Effects:
     def law(self) -> Law | None:
         """Friction law of the model; None for a constant friction coefficient."""
         return law_of(self.friction, self.friction_law)
+
+    @property
+    def drilling(self) -> Spin | None:
+        """What resists spin by a moment; None where bodies do not spin, or do so freely."""
+        way = SPIN[self.spin]
+        return way if way.moment and self.dimension == "spatial" else None
+
+    @property
+    def determines_spin(self) -> bool:
+        """Whether the spin of a body without inertia is determined."""
+        return SPIN[self.spin].locked or bool(SPIN[self.spin].moment)
+
+    @property
+    def surface_numbers(self) -> tuple[str, ...]:
+        """Names of the numbers of a surface that friction law and drilling moment need, in order of the C arrays."""
+        law = () if self.law is None else self.law.columns
+        return (*law, *(() if self.drilling is None else self.drilling.values))
 
     @property
     def permits_moving_ends(self) -> bool:
@@ -195,7 +205,7 @@ class Auto:
     sliders: Annotated[str | None, Choice(("inertial", "massless"))] = None
     rims: Annotated[bool | None, Choice((True, False))] = None
     uplift: Annotated[bool | None, Choice((True, False))] = None
-    spin: Literal["locked", "patch", "free"] = "locked"
+    spin: Annotated[str, Choice(SPIN)] = "locked"
     bouc_wen: Annotated[str, Choice(HYSTERESIS)] = "report"
     friction: Annotated[str | None, Choice(FRICTION)] = None
     friction_law: str | None = None

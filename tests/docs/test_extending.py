@@ -12,9 +12,8 @@ from pathlib import Path
 import pytest
 from support import ROOT
 
-LAW, NUMBER, FIELD, MEMORY, REMEMBERING, NUMBERS, FIELDS, SWITCHES = re.findall(
-    r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(encoding="utf-8"), re.DOTALL
-)
+BLOCKS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(encoding="utf-8"), re.DOTALL)
+LAW, NUMBER, FIELD, MEMORY, REMEMBERING, NUMBERS, FIELDS, SWITCHES, SEAL, SEAL_NUMBER, SEAL_FIELD, DRILLING = BLOCKS
 
 
 def entries(block: str) -> str:
@@ -28,7 +27,10 @@ WHERE = {
     (LAWS, "_NUMBERS = (\n"): f"    {NUMBER.strip()},\n" + entries(NUMBERS),
     (LAWS, "        TEMPERATURE,\n"): entries(MEMORY),
     ("msfp_gen/specification/hysteresis.py", "HYSTERESIS = {\n"): SWITCHES,
-    ("msfp_gen/scene/bearing.py", "    friction_slow: Annotated[float | None"): FIELD + FIELDS,
+    ("msfp_gen/specification/spin.py", "SPIN = {\n"): SEAL,
+    ("msfp_gen/specification/spin.py", "_NUMBERS: tuple[Value, ...] = ("): f"{SEAL_NUMBER.strip()},",
+    ("msfp_gen/scene/bearing.py", "    friction_slow: Annotated[float | None"): FIELD + FIELDS + SEAL_FIELD,
+    ("tests/reference/forces.py", "DRILLING = {\n"): DRILLING,
 }
 SCENE = """
 from dataclasses import replace
@@ -44,13 +46,13 @@ scene = replace(scene, bearing=bearing, effects=effects)
 def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the sources with the new effects."""
     root = tmp_path_factory.mktemp("extended")
-    for folder in ("generator", "templates", "msfp_gen"):
+    for folder in ("generator", "templates", "msfp_gen", "tests/reference"):
         shutil.copytree(ROOT / folder, root / folder, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     for (name, place), block in WHERE.items():
         path = root / name
         text = path.read_text(encoding="utf-8")
         assert text.count(place) == 1, f"{name}: {place!r} is not there"
-        shown = place + block if place.endswith("\n") else block + place
+        shown = place + block if place.endswith(("\n", "(")) else block + place
         path.write_text(text.replace(place, shown), encoding="utf-8")
     return root
 
@@ -148,5 +150,56 @@ assert np.ptp(path) > 0.02 and np.abs(rows.memory[:, 0] - path).max() < 3e-3 * n
 assert rows.memory[-1, 0] < 0.1 * rows.memory[:, 0].max()
 slopes = simulate(scene, gradients=["bearing.surfaces[0].sliding_drop"], gradient_errors=False).gradient
 assert np.abs(slopes["friction_coefficient"].values).max() > 0
+""",
+    )
+
+
+@pytest.mark.slow
+def test_the_seal_resists_spin(extended: Path) -> None:
+    """Its equations are those of the reference, its work closes the energy balance, and its number has a gradient."""
+    run(
+        extended,
+        f"""
+import sys
+sys.path[:0] = [{str(extended / "tests")!r}, {str(ROOT / "tests")!r}]
+from dataclasses import replace
+from types import SimpleNamespace
+import numpy as np
+from reference import forces, stack
+from support import bearing_of, model_of
+from support.random_states import inputs, sensible
+from msfp_gen import Effects, InputError, load_scene, simulate
+from msfp_gen.scene.scene_fields import InitialState
+assert "seal" in forces.DRILLING
+values, state, h, load = sensible((3, 1, 1), 0)
+values = SimpleNamespace(**vars(values))
+values.surfaces = [SimpleNamespace(**vars(each), seal_damping=40.0 * k) for k, each in enumerate(values.surfaces, 1)]
+model, bearing = model_of((3, 1, 1), spin="seal"), bearing_of(values)
+still = replace(state, a=np.zeros_like(state.a))
+for resisted in (True, False):
+    expected = stack.solve(values, still, h, load, "seal" if resisted else "free").acceleration
+    found = model.evaluate(bearing, state.q, state.v, h, **inputs(state, load)).acceleration
+    error = np.abs(found - expected).max() / np.abs(expected).max()
+    assert error < 1e-9 if resisted else error > 1e-6, error
+scene = load_scene("becker-circle-50")
+try:
+    replace(scene, effects=Effects(spin="seal"))
+except InputError as error:
+    assert "seal_damping is missing (surface 1): effects.spin = 'seal' needs it" in str(error)
+bearing = scene.bearing.replace(seal_damping=300.0)
+try:
+    replace(scene, bearing=bearing)
+except InputError as error:
+    assert "effects.spin = 'locked' has no such parameter; leave it out or give 'seal'" in str(error)
+rates = np.zeros((4, 3))
+rates[:, 2] = 0.1
+start = InitialState(np.zeros((4, 3)), rates, np.zeros((4, 2)))
+scene = replace(scene, bearing=bearing, effects=Effects(spin="seal"), duration=8.0, initial_state=start)
+found = simulate(scene, gradients=["bearing.surfaces[0].seal_damping"], gradient_errors=False)
+spin = np.abs(found.history.tilt_rates[:, :, 2])
+assert found.succeeded and found.summary["energy"]["closure_error"] < 5e-3
+assert spin[0].max() == 0.1 and spin[-1].max() < 0.01  # without the seal it grows beyond 1 rad/s
+slope = found.gradient["tilt_rate"].values
+assert np.abs(slope).max() > 1e-6, np.abs(slope).max()
 """,
     )

@@ -135,11 +135,17 @@ def _rim(bearing: Any, turn: Rotation, r: dict[str, Array], g: int) -> tuple[Any
     return gap, gap_rate, magnitude * direction if pressed else none, point, direction  # (3.22)
 
 
-def drilling_moments(bearing: Any, normal: Array, turn: Rotation, touch: Contact) -> Array:
-    """spin="patch": -mu N (2/3) r w / sqrt(w^2 + w_0^2) t~_3 on body g+1, shape (n-1, 3) [N m]."""
-    moments = []
-    for g, surface in enumerate(bearing.surfaces, start=1):
+DRILLING = {
+    "patch": lambda surface, N, r, w: -surface.friction * N * (2 / 3) * r * w / np.sqrt(w**2 + SPIN_RATE**2),
+}
+"""Moment about t~_3 on body g+1 [N m] by word of `spin`: of a surface, N, radius r of the slider's rim, spin rate w."""
+
+
+def drilling_moments(bearing: Any, normal: Array, turn: Rotation, touch: Contact, spin: str) -> Array:
+    """Moments that resist spin on body g+1, shape (n-1, 3) [N m]; zero where `spin` has none."""
+    moments = np.zeros((bearing.layout.n - 1, 3), dtype=np.result_type(normal, touch.basis, *turn.w_total))
+    for g, surface in enumerate(bearing.surfaces, start=1) if spin in DRILLING else ():
         axis, (_, radius, _) = touch.basis[g - 1, 2], slider(bearing, g)
         w = (turn.w_total[g + 1] - turn.w_total[g]) @ axis
-        moments.append(-surface.friction * normal[g - 1] * (2 / 3) * radius * w / np.sqrt(w**2 + SPIN_RATE**2) * axis)
-    return np.array(moments)
+        moments[g - 1] = DRILLING[spin](surface, normal[g - 1], radius, w) * axis
+    return moments

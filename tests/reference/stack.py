@@ -64,15 +64,14 @@ def interfaces(
     rims: bool = True,
     law: str = "report",
 ) -> Interfaces:
-    """Contact, friction, rim and drilling action at every surface; spin is "free", "locked" or "patch"."""
+    """Contact, friction, rim and drilling action at every surface; spin is "free", "locked" or one of DRILLING."""
     touch, rim = forces.contact(bearing, turn, at.r, angles), forces.rim(bearing, turn, at.r)
-    drilling = forces.drilling_moments(bearing, normal, turn, touch)
     return Interfaces(
         touch,
         rim if rims else rim._replace(force=np.zeros_like(rim.force)),
         forces.normal_forces(normal, touch),
         forces.friction_forces(bearing, normal, h, touch, law),
-        drilling if spin == "patch" else np.zeros_like(drilling),
+        forces.drilling_moments(bearing, normal, turn, touch, spin),
     )
 
 
