@@ -1,14 +1,31 @@
 #!/usr/bin/env bash
 # What is published: sdist and wheel are built and checked, with the wheels that `make wheels` left in dist/prebuilt, and
 # each of the two is installed in an empty environment. There, outside the checkout, a preset runs, which builds its model
-# from the installed sources, and a study, with nothing installed beside the package.
+# from the installed sources, and a study, with nothing installed beside the package. Built again in another folder, from
+# files with other times and permissions, they have the same bytes. What passed stands in dist, with its bill of materials.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-bin=$PWD/.venv/bin
+root=$PWD
+bin=$root/.venv/bin
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
-"$bin/python" -m build --outdir "$folder/dist" >"$folder/build.log" 2>&1 || { cat "$folder/build.log" >&2; exit 1; }
+SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct)}
+export SOURCE_DATE_EPOCH
+build() {
+    "$bin/python" -m build --outdir "$1" "$2" >"$folder/build.log" 2>&1 || { cat "$folder/build.log" >&2; exit 1; }
+}
+build "$folder/dist" .
+(
+    umask 077
+    git ls-files -z | xargs -0 cp -P --parents -t "$(mktemp -d "$folder/again.XXXX")"
+    find "$folder"/again.* -exec touch -h -d 2020-02-02 {} +
+    build "$folder/second" "$folder"/again.*
+)
+for archive in "$folder"/dist/*; do
+    cmp "$archive" "$folder/second/${archive##*/}"
+done
+echo "sdist and wheel, built twice, have the same bytes (SOURCE_DATE_EPOCH=$SOURCE_DATE_EPOCH)"
 shopt -s nullglob
 "$bin/python" -m twine check --strict "$folder"/dist/* dist/prebuilt/*.whl
 for archive in "$folder"/dist/*; do
@@ -31,3 +48,9 @@ assert len(rows) and set(rows["status"]) == {"ok"}, rows
 PYTHON
     echo "${archive##*/}: installed, a preset and a study run"
 done
+cd "$root"
+mkdir -p dist
+rm -f dist/msfp_gen-*
+cp "$folder"/dist/* dist
+"$bin/python" tools/sbom.py "$folder/whl/venv" "$folder"/dist/* -o dist/msfp_gen.cdx.json
+echo "dist: sdist, wheel, and msfp_gen.cdx.json, what they contain and need"

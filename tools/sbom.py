@@ -1,0 +1,91 @@
+"""Write the bill of materials of the distribution, CycloneDX 1.6: `python tools/sbom.py ENVIRONMENT dist/*`.
+
+cyclonedx-py states the packages of an environment in which the distribution is installed, with versions, licences and
+who needs whom. Added are the sha256 of the archives, and what the archives themselves contain of others: three.js.
+SOURCE_DATE_EPOCH sets the time that is stated.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import subprocess
+import sys
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
+
+ROOT = Path(__file__).resolve().parents[1]
+THREE = ROOT / "msfp_gen" / "report" / "assets" / "three.min.js"
+
+
+def packages(environment: Path) -> dict[str, Any]:
+    """What cyclonedx-py finds in an environment, the distribution itself as the main component."""
+    command = [sys.executable, "-m", "cyclonedx_py", "environment", "--pyproject", str(ROOT / "pyproject.toml")]
+    command += ["--mc-type", "library", "--sv", "1.6", "--output-reproducible", str(environment)]
+    document: dict[str, Any] = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+    return document
+
+
+def archives(paths: list[Path]) -> list[dict[str, Any]]:
+    """The files that are published, each with its hash."""
+    return [
+        {
+            "type": "file",
+            "bom-ref": path.name,
+            "name": path.name,
+            "hashes": [{"alg": "SHA-256", "content": hashlib.sha256(path.read_bytes()).hexdigest()}],
+        }
+        for path in sorted(paths)
+    ]
+
+
+def contained() -> dict[str, Any]:
+    """three.js, with the version that the first line of its file states."""
+    found = re.match(r"/\*! three\.js (\S+) \| (\S+) \|", THREE.read_text(encoding="utf-8"))
+    if found is None:
+        raise SystemExit(f"error: {THREE}: its first line states no version and licence")
+    version, licence = found.groups()
+    return {
+        "type": "library",
+        "bom-ref": f"three@{version}",
+        "name": "three",
+        "version": version,
+        "licenses": [{"license": {"id": licence}}],
+        "purl": f"pkg:npm/three@{version}",
+    }
+
+
+def bill(environment: Path, paths: list[Path]) -> str:
+    """The document; raises SystemExit where it does not follow the schema."""
+    document = packages(environment)
+    main, three = document["metadata"]["component"], contained()
+    main["components"] = [*archives(paths), three]
+    main["purl"] = f"pkg:pypi/{main['name']}@{main['version']}"
+    for node in document["dependencies"]:
+        if node["ref"] == main["bom-ref"]:
+            node["dependsOn"] = sorted([*node["dependsOn"], three["bom-ref"]])
+    document["dependencies"].append({"ref": three["bom-ref"]})
+    text = json.dumps(document, indent=2, sort_keys=True) + "\n"
+    error = JsonStrictValidator(SchemaVersion.V1_6).validate_str(text)
+    if error is not None:
+        raise SystemExit(f"error: the bill of materials does not follow CycloneDX 1.6: {error}")
+    return text
+
+
+def main() -> None:
+    """Write the file of -o."""
+    options = ArgumentParser(description=__doc__)
+    options.add_argument("environment", type=Path, help="environment with the distribution and nothing else")
+    options.add_argument("archives", type=Path, nargs="+", help="files that are published")
+    options.add_argument("-o", "--output", type=Path, required=True, help="JSON file")
+    given = options.parse_args()
+    given.output.write_text(bill(given.environment, given.archives), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
