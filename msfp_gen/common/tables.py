@@ -42,6 +42,12 @@ class Table:
     def _cell(self, row: Sequence[str], column: int, width: int) -> str:
         return row[column].rjust(width) if self.columns and column else row[column].ljust(width)
 
+    @property
+    def markdown(self) -> str:
+        """The rows below the names of the columns, as Markdown; without the title."""
+        lines = (self.columns, ["---"] * len(self.columns), *self.rows)
+        return "".join(" | ".join(("", *cells, "")).strip() + "\n" for cells in lines)
+
     def rich(self) -> RichTable:
         """The table for a terminal, drawn by the library rich."""
         from rich import box

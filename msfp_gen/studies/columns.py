@@ -158,11 +158,6 @@ def catalogue(counts: Counts) -> dict[str, Source]:
     return sources
 
 
-def of_building(summary: Mapping[str, Any]) -> bool:
-    """Whether this is the summary of a building."""
-    return "bearings" in summary
-
-
 def value_at(table: Any, path: str) -> Any:
     """The value at a dotted path of keys or attributes, None without it; `*` gives a list of the values of all rows."""
     value = table

@@ -16,7 +16,7 @@ from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.file.changes import keys_of
 from msfp_gen.scene.file.loader import scene_table
-from msfp_gen.studies.columns import BEARING, BUILDING, Quantity, of_building, plain_cell, value_at
+from msfp_gen.studies.columns import Counts, Source, catalogue, plain_cell, value_at
 from msfp_gen.studies.study.axes import Axis, Recipe, SceneFactory, located, motion_of
 
 if TYPE_CHECKING:
@@ -107,13 +107,17 @@ def _variation(source: str | Path, varied: dict[str, Any], scene: AnyScene) -> V
 
 
 class Row(NamedTuple):
-    """A run of a sweep: its number from 1, source, varied fields by path, summary, and the file with its rows."""
+    """A run of a sweep.
+
+    Its number from 1, source, varied fields by path, summary, the file with its rows, and the counts of its scene.
+    """
 
     number: int
     source: str
     varied: Mapping[str, Any]
     summary: Mapping[str, Any]
     file: str
+    counts: Counts
 
     def as_dict(self) -> dict[str, Any]:
         """The summary with the varied fields, ready for JSON."""
@@ -127,8 +131,11 @@ def row_of(number: int, variation: Variation, result: Result | BuildingResult | 
         summary: Mapping[str, Any] = {"status": result.status, "message": str(result), "name": variation.scene.name}
         if isinstance(variation.scene, BuildingScene):
             summary = {**summary, "bearings": []}
-        return Row(number, variation.source, variation.varied, summary, "")
-    return Row(number, variation.source, variation.varied, result.summary, "" if file is None else file.name)
+        file = None
+    else:
+        summary = result.summary
+    name = "" if file is None else file.name
+    return Row(number, variation.source, variation.varied, summary, name, Counts.of(variation.scene))
 
 
 def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> Path:
@@ -144,21 +151,21 @@ def _columns(rows: Sequence[Row]) -> dict[tuple[str, str], list[Any]]:
         ("scene", ""): [row.source for row in rows],
         **{(path, ""): [plain_cell(row.varied.get(path)) for row in rows] for path in varied},
     }
-    for name, (unit, path, *_) in _known(rows).items():
-        values = [value_at(row.summary, path) for row in rows]
-        if ".*" not in path:
-            table[name, unit] = [plain_cell(value) for value in values]
-            continue
-        for index in range(max(map(len, filter(None, values)), default=0)):
-            table[f"{name}_{index + 1}", unit] = [v[index] if v and index < len(v) else None for v in values]
+    for name, source in _sources(rows).items():
+        values = [plain_cell(source.value(row.summary, None)) for row in rows]
+        if source.place is None or any(value is not None for value in values):
+            table[name, source.quantity.unit] = values
     return {**table, ("file", ""): [row.file for row in rows]}
 
 
-def _known(rows: Sequence[Row]) -> dict[str, Quantity]:
-    """The quantities of the summary that some of the rows have."""
-    kinds = {of_building(row.summary) for row in rows}
-    quantities = {**(BEARING if False in kinds else {}), **(BUILDING if True in kinds else {})}
-    return {name: quantity for name, quantity in quantities.items() if not quantity.characterised}
+def _sources(rows: Sequence[Row]) -> dict[str, Source]:
+    """The quantities of the summaries of bearings and of buildings, where there are some."""
+    counts: dict[bool, Counts] = {}
+    for row in rows:
+        of_building = row.counts.bearings > 0
+        counts[of_building] = counts.get(of_building, Counts()).or_more(row.counts)
+    sources = {name: source for _, each in sorted(counts.items()) for name, source in catalogue(each).items()}
+    return {name: source for name, source in sources.items() if not source.quantity.characterised}
 
 
 def sweep_table(rows: Sequence[Row]) -> Table:

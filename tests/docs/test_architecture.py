@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from importlib.metadata import packages_distributions
 
 import pytest
@@ -44,9 +45,16 @@ def type_checking(node):
     return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
 
 
+@cache
+def tree_of(path):
+    """The syntax tree of a file; each is read once."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imports_of(path, *, late):
     """Modules that a file imports, made absolute: when it is imported itself, or (late) ever, for types too."""
-    found, todo = set(), list(ast.parse(path.read_text(encoding="utf-8")).body)
+    found, todo = set(), list(tree_of(path).body)
     package = name_of(path) if path.name == "__init__.py" else name_of(path).rpartition(".")[0]
     while todo:
         node = todo.pop()
@@ -60,7 +68,7 @@ def imports_of(path, *, late):
             names = {f"{module}.{alias.name}" for alias in node.names}
             found |= names if names <= set(MODULES) else {module, *names}  # a package is not what it holds
         todo += list(ast.iter_child_nodes(node))
-    return found
+    return frozenset(found)
 
 
 MODULES = {name_of(path): path for path in (*PACKAGE, *GENERATOR)}
@@ -132,13 +140,13 @@ def test_generator_is_pure():
 
 def calls(path):
     """Plain names that a file calls."""
-    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    nodes = ast.walk(tree_of(path))
     return {node.func.id for node in nodes if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
 
 
 def streams(path):
     """Streams of the process that a file touches."""
-    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    nodes = ast.walk(tree_of(path))
     return {ast.unparse(node) for node in nodes if isinstance(node, ast.Attribute)} & {"sys.stdout", "sys.stderr"}
 
 

@@ -126,10 +126,13 @@ def as_dict(study: Study) -> dict[str, Any]:
 
 def tables(study: Study) -> list[Table]:
     """The study as tables for the console."""
-    shown = [_cells(point) for point in study.points]
     notes = [("reference", reference_text(study)), *(("note", note) for note in study.notes)]
+    return [_points(study), Table("reference of the errors, and notes", (), notes)]
+
+
+def _points(study: Study) -> Table:
     title = f"{study.kind} of {study.scene.name or 'unnamed scene'}"
-    return [Table(title, HEADS, shown), Table("reference of the errors, and notes", (), notes)]
+    return Table(title, HEADS, [_cells(point) for point in study.points])
 
 
 def _cells(point: Point) -> tuple[str, ...]:
@@ -155,10 +158,8 @@ def reference_text(study: Study) -> str:
 
 def markdown(study: Study) -> str:
     """The table, the reference and the notes as Markdown."""
-    lines = [
-        " | ".join(("", *cells, "")).strip() for cells in (HEADS, ("---",) * len(HEADS), *map(_cells, study.points))
-    ]
-    return "\n".join([*lines, "", f"Reference: {reference_text(study)}.", *(f"\n{note}." for note in study.notes), ""])
+    notes = "".join(f"\n{note}.\n" for note in study.notes)
+    return f"{_points(study).markdown}\nReference: {reference_text(study)}.\n{notes}"
 
 
 def figure_table(study: Study) -> dict[str, dict[str, list[float]]]:

@@ -328,17 +328,17 @@ def test_plain_data_of_a_verdict(make: Any) -> None:
     assert worst in verdict["largest"] and worst["limit"] == "rim_force" and worst["unit"] == "N"
 
 
-@pytest.mark.parametrize("name", [*presets.names("scene"), *sorted((ROOT / "examples").glob("*.toml"))], ids=str)
+FIRST = ["ridgecrest-ccc", "ridgecrest-clc", "hospital-ccc", "hospital-clc", "fenz-test5"]  # that a user meets
+PUBLISHED = [*presets.names("scene"), *presets.names("building"), *sorted((ROOT / "examples").glob("*.toml"))]
+
+
+@pytest.mark.parametrize("name", thinned(PUBLISHED, lambda name: name != "hospital-clc"), ids=str)
 def test_no_published_design_is_blamed(name: str | Path) -> None:
-    """Every preset scene and example, as it is, is within the limits that are not given."""
+    """Every preset and example, as it is, is within the limits that are not given; the first have no notes."""
     result = simulate(load_scene(name))
     assert result.scene.limits is None and result.verdict.ok, result.verdict.text
-
-
-@pytest.mark.parametrize("name", thinned(presets.names("building"), lambda name: name != "hospital-clc"))
-def test_no_preset_building_is_blamed(name: str) -> None:
-    result = simulate(load_scene(name))
-    assert result.verdict.ok and result.verdict.text == "within the limits of the device"
+    assert result.verdict.text == "within the limits of the device"
+    assert name not in FIRST or (result.status == "ok" and not result.notes)
 
 
 LIMITED = Limits(rim_force=12e3, uplift_height=1e-3, temperature=180.0, displacement=0.3)
