@@ -26,7 +26,7 @@ BODY = {"mass": 200.0, "height": 0.05, "rim_radius": 0.05, "inertia": (60.0, 80.
 NONE = (0.0,) * 6
 WEIGHT = (0.0, 0.0, -LOAD, 0.0, 0.0, 0.0)
 MASS = {"mass": 2000.0, "inertia": 400.0, "height": 0.3, "rotational_stiffness": 4e5, "rotational_damping": 1e3}
-PLANAR, SPATIAL = Effects(dimension="planar", rims=False), Effects(rims=False)
+PLANAR, SPATIAL = Effects(dimension="planar"), Effects()  # rims are far: the models of other tests
 LAW = "mu * (1 - c1 * exp(-c2 * v))"
 RIPPLE = 20.0  # frequency of the paths [rad/s]
 
@@ -126,8 +126,8 @@ def smooth() -> dict[str, Case]:
             friction=1.0,
             **with_(SPATIAL, bouc_wen="plastic"),
         ),
-        planar("rims, planar", double(**pressed), **with_(PLANAR, rims=True)),
-        spatial("rims", double(**pressed), **with_(SPATIAL, rims=True)),
+        planar("rims, planar", double(**pressed)),
+        spatial("rims", double(**pressed)),
         planar("velocity law, planar", double(**slow), steps=SHORT, **with_(PLANAR, friction="velocity")),
         spatial("velocity law", double(**slow), steps=SHORT, **with_(SPATIAL, friction="velocity")),
         spatial("pressure and velocity law", double(**hot), steps=SHORT, **with_(SPATIAL, friction="pv")),
@@ -166,7 +166,7 @@ def smooth() -> dict[str, Case]:
             **with_(PLANAR, top_rotation=True),
         ),
         spatial("rig that holds its height", top=rig(vertical_stiffness=2e5, vertical_damping=1e3)),
-        spatial("rigid mass", top=Top.mass(**MASS), load=WEIGHT),
+        spatial("rigid mass", top=Top.mass(**MASS), load=WEIGHT, **with_(SPATIAL, rims=False)),
         planar("sprung top", top=Top.mass(**MASS, vertical_stiffness=2e6, vertical_damping=1e4), load=WEIGHT),
         spatial("massless sliders", steps=STIFF, **with_(SPATIAL, sliders="massless")),
         spin("spin held by the contact patch", "patch"),

@@ -74,7 +74,7 @@ def heated_building() -> BuildingResult:
     """The frame with friction that depends on temperature, after a second of its motion."""
     bearing = BEARING.replace(reference_pressure=1.37e7)
     made = scene(frame(), bearing=bearing, duration=1.0)
-    hot = [replace(one, effects=Auto(friction="pvt")) for one in made.bearings]
+    hot = [replace(one, effects=Auto(friction="pvt", bouc_wen="plastic")) for one in made.bearings]
     return simulate(replace(made, bearings=hot))
 
 
@@ -217,7 +217,7 @@ def test_a_contact_off_its_face_in_a_building() -> None:
 
 def test_without_a_model_of_rims_no_force_is_made_up() -> None:
     """The sliding beyond the capacity is named in its place."""
-    beyond = changed_scene("fenz-test5", {"effects.rims": False})
+    beyond = changed_scene("fenz-test5", {"effects.dimension": "planar", "effects.rims": False})
     verdict = simulate(beyond).verdict
     assert {one.limit.key for one in verdict.exceeded} == {"beyond_rim"}
     assert verdict.worst["rim_force"].value.reached == 0
