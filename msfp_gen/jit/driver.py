@@ -60,7 +60,7 @@ def headers() -> dict[str, str]:
     from msfp_gen.generator.header import public_header
 
     runtime = resources.files("msfp_gen") / "runtime"
-    own = {name: (runtime / name).read_text(encoding="utf-8") for name in ("msfp_math.h", "msfp_hash.h")}
+    own = {name: (runtime / name).read_text(encoding="utf-8") for name in ("msfp_math.h", "msfp_hash.h", "msfp_time.h")}
     return {"msfp.h": public_header(), **own}
 
 

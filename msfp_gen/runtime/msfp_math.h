@@ -11,6 +11,14 @@
 #include <stdint.h>
 #include <string.h>
 
+/* A kernel, and a sum over columns, is always inlined, so that it is compiled for the vectors of its caller. */
+#if defined(__GNUC__)
+#define MSFP_INLINED __attribute__((always_inline))
+#else
+#define MSFP_INLINED
+#endif
+#define MSFP_INLINE MSFP_INLINED static inline
+
 #define MSFP_HALF_PI 1.5707963267948966
 
 /* ---- polynomials: what remains after the first terms ---- */

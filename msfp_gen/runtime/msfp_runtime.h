@@ -33,13 +33,6 @@ extern "C" {
 #ifndef MSFP_COLUMNWISE
 #define MSFP_COLUMNWISE MSFP_WIDE
 #endif
-/* A kernel is always inlined, so that it is compiled for the vectors of its caller. */
-#if defined(__GNUC__)
-#define MSFP_INLINED __attribute__((always_inline))
-#else
-#define MSFP_INLINED
-#endif
-#define MSFP_INLINE MSFP_INLINED static inline
 /* Before a short loop of constant length, so that the tables it reads are constants when it is compiled. */
 #if defined(__GNUC__) && !defined(__clang__)
 #define MSFP_UNROLL _Pragma("GCC unroll 32")

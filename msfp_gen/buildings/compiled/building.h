@@ -6,6 +6,7 @@
 #include "msfp_building.h"
 #include "msfp_hash.h"
 #include "msfp_math.h"
+#include "msfp_time.h"
 
 enum { FACTORS = 3 }; /* step sizes whose factors are kept */
 enum { ENDED = -1 };

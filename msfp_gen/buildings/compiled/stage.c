@@ -19,12 +19,7 @@ static const double tolerance = 1e-3;  /* of the balance of a stage: share of rt
 /* Value and two derivatives along E1, E2, E3. */
 static void evaluate_ground(const msfp_piecewise *g, int *last, double t, double *out)
 {
-    int k = *last < g->pieces ? *last : 0;
-    while (k > 0 && t < g->knots[k])
-        --k;
-    while (k + 1 < g->pieces && t >= g->knots[k + 1])
-        ++k;
-    *last = k;
+    const int k = *last = msfp_piece_at(g->knots, g->pieces, *last, t);
     const double s = t - g->knots[k], *c = g->coefficients + (size_t)k * 6 * (MSFP_DEGREE + 1);
     for (int i = 0; i < 3; ++i, c += MSFP_DEGREE + 1) {
         double value = 0.0, rate = 0.0, second = 0.0;
@@ -279,13 +274,11 @@ static void begin_stage(msfp_building *b, int i, double h)
     const int n = b->scene.n;
     const msfp_method_stages *m = &b->method;
     const double beta = m->diagonal * h;
-    for (int k = 0; k < n; ++k) {
-        b->Q[k] = b->u[k];
-        b->V[k] = b->v[k];
-        for (int j = 0; j < i; ++j) {
-            b->Q[k] += h * m->weights[i][j] * b->stage_v[(size_t)j * n + k];
-            b->V[k] += h * m->weights[i][j] * b->stage_a[(size_t)j * n + k];
-        }
+    memcpy(b->Q, b->u, (size_t)n * sizeof *b->Q);
+    memcpy(b->V, b->v, (size_t)n * sizeof *b->V);
+    for (int j = 0; j < i; ++j) {
+        msfp_add(b->Q, b->stage_v + (size_t)j * n, h * m->weights[i][j], n);
+        msfp_add(b->V, b->stage_a + (size_t)j * n, h * m->weights[i][j], n);
     }
     multiply(n, b->scene.mass, b->V, 0, b->free);
     for (int k = 0; k < n; ++k)
@@ -357,11 +350,10 @@ static double building_error(msfp_building *b, double h)
     const int last = b->method.count - 1;
     memset(eu, 0, n * sizeof *eu);
     memset(ev, 0, n * sizeof *ev);
-    for (int j = 0; j <= last; ++j)
-        for (size_t c = 0; c < n; ++c) {
-            eu[c] += h * b->method.errors[j] * b->stage_v[j * n + c];
-            ev[c] += h * b->method.errors[j] * b->stage_a[j * n + c];
-        }
+    for (int j = 0; j <= last; ++j) {
+        msfp_add(eu, b->stage_v + j * n, h * b->method.errors[j], s->n);
+        msfp_add(ev, b->stage_a + j * n, h * b->method.errors[j], s->n);
+    }
     multiply(s->n, s->mass, ev, 0, y);
     for (size_t c = 0; c < n; ++c)
         y[c] /= -beta;

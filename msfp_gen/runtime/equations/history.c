@@ -33,12 +33,7 @@ static void hold(msfp_history *h, int i)
 /* Find the piece that holds t, starting at the last one found. */
 static void find(msfp_history *h, double t)
 {
-    int i = h->last;
-    while (i + 1 < h->pieces && t >= h->knots[i + 1])
-        ++i;
-    while (i > 0 && t < h->knots[i])
-        --i;
-    h->last = i;
+    const int i = h->last = msfp_piece_at(h->knots, h->pieces, h->last, t);
     if (h->held != i + 1)
         hold(h, i);
 }

@@ -10,8 +10,6 @@ enum {
     STABILITY_LIMIT_STEPS =
         500 /* consecutive steps; rim contact causes a few (Hairer and Wanner, Solving ODEs II, IV.2: 15) */
 };
-static const double smallest_step = 1e-9;     /* [s], far below any period of a bearing; closer times count as equal */
-static const double shortest_to_event = 1e-6; /* [s]; a shorter step to an event would be lost in roundoff */
 
 static int solve_initial_state(msfp_run *run)
 {
@@ -114,37 +112,18 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
     return run->status;
 }
 
-double msfp_smallest_step(double t) { return smallest_step * fmax(1.0, t); }
-
-/* The next time [s] at which a step must end because a prescribed history has a jump or a kink there; infinite if
- * none. */
-static double next_stop(msfp_run *run)
-{
-    const msfp_options *o = &run->options;
-    while (run->stop < o->stop_count && o->stops[run->stop] <= run->now.t + msfp_smallest_step(run->now.t))
-        ++run->stop;
-    return run->stop < o->stop_count ? o->stops[run->stop] : INFINITY;
-}
-
-/* Whether the step ends at such a time. */
+/* Whether the step ends where a prescribed history has a jump or a kink. */
 static int at_stop(const msfp_run *run)
 {
     const msfp_options *o = &run->options;
     return run->stop < o->stop_count && fabs(run->next.t - o->stops[run->stop]) <= msfp_smallest_step(run->next.t);
 }
 
-/* The step h, shortened to what the prescribed histories allow: each interval of time has a longest step, and a step
- * may enter an interval only if it is no longer than the longest step of that interval. */
+/* The step h, shortened to what histories, rows and the scene allow. */
 static double allowed_step(msfp_run *run, double h)
 {
     const msfp_options *o = &run->options;
-    const double t = run->now.t;
-    while (run->span + 1 < o->span_count && o->span_ends[run->span] <= t + msfp_smallest_step(t))
-        ++run->span;
-    if (o->span_count)
-        h = fmin(h, o->span_steps[run->span]);
-    for (int i = run->span; i + 1 < o->span_count && t + h > o->span_ends[i]; ++i)
-        h = fmin(h, fmax(o->span_ends[i] - t, o->span_steps[i + 1]));
+    h = msfp_allowed_step(o->span_ends, o->span_steps, o->span_count, &run->span, run->now.t, h);
     if (o->output_step > 0.0)
         h = fmin(h, ROWS_OF_STEP * o->output_step);
     return o->max_step > 0.0 ? fmin(h, o->max_step) : h;
@@ -153,7 +132,8 @@ static double allowed_step(msfp_run *run, double h)
 /* Latest time [s] at which the next step may end. */
 static double latest_end(msfp_run *run)
 {
-    double end = fmin(run->options.duration, next_stop(run));
+    const msfp_options *o = &run->options;
+    double end = fmin(o->duration, msfp_next_stop(o->stops, o->stop_count, &run->stop, run->now.t));
     if (run->next_jump < run->jump_count)
         end = fmin(end, run->jumps[run->next_jump]);
     if (run->options.output_step > 0.0 && msfp_is_quasistatic(run)) /* a step costs no more than a row */
@@ -179,19 +159,11 @@ static int try_step(msfp_run *run, double h, int prescribed, double *error)
     return prescribed || msfp_energy_consistent(run) ? msfp_check_state(run, &run->work, &run->next) : MSFP_E_STEP;
 }
 
-/* Factor of the step size after an accepted step. */
-static double step_factor(const msfp_run *run, double error)
-{
-    const double order = msfp_control_order(run->options.method);
-    const double e = fmax(error, 1e-6), last = fmax(run->previous_error, 1e-6);
-    return fmin(5.0, fmax(0.2, 0.9 * msfp_pow(e, -0.7 / order) * msfp_pow(last, 0.4 / order)));
-}
-
 /* Shorten the step after a failure. Returns 1 where the step is already the smallest: the run ends. */
 static int shorten_step(msfp_run *run, double h, double factor, int status)
 {
     /* The time at which a body leaves the stack is known well enough before steps are lost in roundoff. */
-    const double smallest = status == MSFP_E_PARTED ? shortest_to_event : smallest_step;
+    const double smallest = status == MSFP_E_PARTED ? MSFP_SHORTEST_TO_EVENT : MSFP_CLOSE;
     run->h = h * factor;
     if (run->h >= smallest * fmax(1.0, run->now.t))
         return 0;
@@ -206,7 +178,8 @@ static int accept(msfp_run *run, const double *before, double *after, int locate
     MSFP_IF_GRADIENTS(msfp_gradients_before_step(run), (void)0);
     /* A step that was cut to end at a given time says little about the step size: the earlier proposal stands. */
     const int cut = h < 0.9 * run->h && error < 0.5;
-    run->h = fmax(h * step_factor(run, error), cut ? run->h : 0.0);
+    const double factor = msfp_step_factor(error, run->previous_error, msfp_control_order(run->options.method));
+    run->h = fmax(h * factor, cut ? run->h : 0.0);
     run->previous_error = error;
     run->restart = run->retry_after_newton = 0;
     if (run->stability_limit_steps >= STABILITY_LIMIT_STEPS)
@@ -266,15 +239,15 @@ static int one_step(msfp_run *run)
         }
         if (error > 1.0 && !(prescribed > 0.0)) {
             ++run->counts[MSFP_COUNT_REJECTED_STEPS];
-            return !shorten_step(run, h, fmax(0.1, 0.9 * msfp_pow(error, -1.0 / msfp_control_order(run->options.method))),
-                                 MSFP_E_STEP);
+            const double factor = msfp_shrink_factor(error, msfp_control_order(run->options.method));
+            return !shorten_step(run, h, factor, MSFP_E_STEP);
         }
         memcpy(before, run->events_now, sizeof before);
         msfp_event_values(run, &run->next, after);
-        const double share = relocations < 4 && !(prescribed > 0.0) ? msfp_first_event(run, before, after) : 1.0;
+        const double share = relocations < MSFP_RELOCATIONS && !(prescribed > 0.0) ? msfp_first_event(run, before, after) : 1.0;
         if (share >= 1.0)
             break;
-        h = fmin(0.99 * h, fmax(h * share, shortest_to_event));
+        h = msfp_step_to_event(h, share);
     }
     if (fabs(run->next.t - end) <= msfp_smallest_step(run->next.t)) /* end exactly there */
         run->next.t = end;

@@ -5,8 +5,6 @@
 
 /* ---- run.c ---- */
 
-/* The shortest step at time t, and the difference below which two times are the same [s]. */
-double msfp_smallest_step(double t);
 /* Accelerations, friction rates and powers consistent with the present state: at the start and after a jump of the base
  * acceleration. Returns MSFP_OK or a status. */
 int msfp_consistent_initial_state(msfp_run *run);

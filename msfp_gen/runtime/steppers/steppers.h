@@ -38,12 +38,6 @@ msfp_weights msfp_weights_at(const msfp_run *run, double share);
 void msfp_interpolate(const msfp_run *run, double share, msfp_state *out);
 /* Absolute tolerance of coordinate d of body j + 1: of an angle [rad], or of a separation (d >= 3) [m]. */
 double msfp_absolute_tolerance(const msfp_run *run, int j, int d);
-/* sum += weight rates, of `count` numbers: of a state, or of its columns. */
-MSFP_INLINE void msfp_add(double *restrict sum, const double *restrict rates, double weight, int count)
-{
-    for (int i = 0; i < count; ++i)
-        sum[i] += weight * rates[i];
-}
 /* sum += h times the weighted rates of the first `count` states, of what is integrated. */
 void msfp_add_rates(msfp_state *sum, const msfp_state *states, const double *weights, int count, double h);
 /* The state of the evaluation in run->work at the point `at`, with Y, Z in `f` and all rates, but for powers and what a
