@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The wheel with compiled models: built, checked, and installed in an empty environment of each Python that there is.
-# Presets of a bearing and of a building run there without a compiler, without a cache and without SymPy.
+# Presets of a bearing and of a building run there without a compiler, without a cache and without SymPy. A second build,
+# in other folders and with empty caches, must give the same bytes.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bin=$PWD/.venv/bin
@@ -9,9 +10,13 @@ trap 'rm -rf "$folder"' EXIT
 
 "$bin/uv" venv -q --python "$bin/python" "$folder/tools"
 "$bin/uv" pip install -q --python "$folder/tools" "$PWD[wheels]"
+export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct)}
 "$folder/tools/bin/python" -m build --wheel --outdir "$folder" . >"$folder/build.log" 2>&1 || { cat "$folder/build.log" >&2; exit 1; }
 rm -rf dist/prebuilt
 (cd "$folder" && tools/bin/python "$OLDPWD/tools/prebuilt_wheel.py" msfp_gen-*-any.whl -o "$OLDPWD/dist/prebuilt")
+(cd "$folder" && ZIG_GLOBAL_CACHE_DIR=$folder/zig ZIG_LOCAL_CACHE_DIR=$folder/zig tools/bin/python "$OLDPWD/tools/prebuilt_wheel.py" msfp_gen-*-any.whl -o again)
+cmp dist/prebuilt/*.whl "$folder"/again/*.whl
+echo "the wheel with compiled models: built twice, bit-identical"
 "$bin/python" -m twine check --strict dist/prebuilt/*
 tested=0
 for version in 3.11 3.12 3.13 3.14; do

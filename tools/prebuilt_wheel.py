@@ -21,6 +21,7 @@ from msfp_gen.jit.driver import build_driver
 from msfp_gen.jit.prebuilt import LEVELS, add_prebuilt, prebuilt_specs
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from build_backend import normal_zip, rewrite
 from quick import QUICK, parser, pick
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -56,7 +57,12 @@ def main() -> None:
         with TemporaryDirectory() as cache:
             add_models(unpacked / "msfp_gen" / "prebuilt", zig, Path(cache))
         change_tags(unpacked)
-        subprocess.run([*tool, "pack", unpacked, "-d", output.absolute()], check=True)
+        packed = Path(built) / "packed"
+        packed.mkdir()
+        subprocess.run([*tool, "pack", unpacked, "-d", packed], check=True)
+        (wheel,) = packed.iterdir()
+        rewrite(wheel, normal_zip)
+        shutil.copy(wheel, output)
 
 
 def pure_wheel(folder: Path) -> Path:

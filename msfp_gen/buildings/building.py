@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from msfp_gen.buildings.matrix_market import read_matrix
 from msfp_gen.buildings.storey import FREEDOMS, MOTIONS, BaseSlab, Columns, Node, Storey, frame, rigid
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import require_type
@@ -313,9 +314,7 @@ def _read(path: Path, field: str, name: str) -> Any:
                     raise InputError(f"{field} = {str(path)!r}: it has no array {name!r} but {', '.join(file)}")
                 return file[name]
         if path.suffix == ".mtx":
-            from scipy.io import mmread
-
-            return mmread(BytesIO(read_input(path)))
+            return read_matrix(read_input(path).decode("utf-8"), MOST)
     except OSError as error:
         raise InputError(f"{field} = {str(path)!r}: cannot be read ({error.strerror}); check the file") from None
     except MsfpError:

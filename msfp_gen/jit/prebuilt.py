@@ -60,7 +60,10 @@ def find_prebuilt_driver(module: str, files: Mapping[str, str]) -> tuple[Path, c
 
 
 def add_prebuilt(level: int, built: Path, root: Path) -> Path:
-    """Copy what is in the folder `built`, compiled for a level of the processor, to `root`; returns its folder."""
+    """Copy what is in the folder `built`, compiled for a level of the processor, to `root`; returns its folder.
+
+    The manifest states neither the times of the build nor where its compiler lay, so that two builds are the same.
+    """
     manifest = cache.Manifest.read(built)
     data = (built / manifest.extension).read_bytes()
     folder = root / _folder_name(manifest.module, _content(manifest), level)
@@ -68,7 +71,9 @@ def add_prebuilt(level: int, built: Path, root: Path) -> Path:
     extension = f"{manifest.module}{SUFFIX}"
     (folder / extension).write_bytes(data)
     files = {extension: hashlib.sha256(data).hexdigest()}
-    replace(manifest, key=folder.name, extension=extension, files=files).write(folder)
+    compiler = [Path(word).name if Path(word).is_absolute() else word for word in manifest.inputs["compiler"]]
+    inputs = {**manifest.inputs, "compiler": compiler}
+    replace(manifest, inputs=inputs, key=folder.name, extension=extension, files=files, stages={}).write(folder)
     return folder
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -11,9 +10,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from msfp_gen.common.fields import Quantity, Text
-from msfp_gen.common.inputs import read_input
+from msfp_gen.common.inputs import is_input
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import known_keys, parsed, suggestion
+from msfp_gen.scene.file.loader import toml_file, toml_table
 
 Pair = tuple[float, float]
 
@@ -134,12 +134,10 @@ def load_factors(source: str | Path) -> FactorTable:
     Raises InputError with one line that names file, field, value and remedy.
     """
     path = Path(source)
-    if str(source) in _bundled() or not path.is_file():
-        return _read(str(source), factor_text(str(source)))
+    if str(source) in _bundled() or not is_input(path):
+        return _read(str(source), toml_table(factor_text(str(source))))
     try:
-        return _read(path.stem, read_input(path).decode("utf-8"))
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: no UTF-8 text at byte {error.start}; save the file as UTF-8") from None
+        return _read(path.stem, toml_file(path))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -151,12 +149,8 @@ def _bundled() -> dict[str, str]:
     return {name: paths[name].read_text(encoding="utf-8") for name in sorted(paths)}
 
 
-def _read(name: str, text: str) -> FactorTable:
-    """Parse and check the TOML text of a table."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"no valid TOML: {error}") from None
+def _read(name: str, table: Mapping[str, Any]) -> FactorTable:
+    """Check the table of a TOML file."""
     known_keys(table, _TABLE_KEYS, "")
     rule = _choice(table.get("rule"), RULES, "rule")
     default = RULES[rule].adjustment
