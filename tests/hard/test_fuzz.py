@@ -24,8 +24,8 @@ from msfp_gen.result import Result
 
 @pytest.fixture(scope="module")
 def short() -> dict[str, Any]:
-    """90 scenes of a few models, three of them held against the second method."""
-    command = [sys.executable, str(ROOT / "benchmarks" / "fuzz.py"), "--scenes", "90", "--seed", "7", "--check", "3"]
+    """45 scenes of a few models, two of them held against the second method."""
+    command = [sys.executable, str(ROOT / "benchmarks" / "fuzz.py"), "--scenes", "45", "--seed", "7", "--check", "2"]
     done = subprocess.run([*command, "--short"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     found: dict[str, Any] = json.loads(done.stdout)
@@ -33,9 +33,9 @@ def short() -> dict[str, Any]:
 
 
 def test_every_scene_ends_right_or_with_a_name(short: dict[str, Any]) -> None:
-    assert short["scenes"] == sum(short["ends"].values()) == 90 and short["faults"] == []
-    assert short["sensible"] > 10 and short["sensible_failures"] == []
-    assert short["checked"] == 3 and short["largest_deviation"] <= 1.0
+    assert short["scenes"] == sum(short["ends"].values()) == 45 and short["faults"] == []
+    assert short["sensible"] > 5 and short["sensible_failures"] == []
+    assert short["checked"] == 2 and short["largest_deviation"] <= 1.0
 
 
 @pytest.mark.slow

@@ -119,6 +119,7 @@ def numbers(page):
     return [float(cell.strip(" %")) for row in rows for cell in row]
 
 
+@pytest.mark.slow
 def test_page_shows_what_is_measured(tmp_path):
     """Within the last digit or two: another compiler may round elsewhere."""
     page = (ROOT / "docs" / "devices.md").read_text(encoding="utf-8")

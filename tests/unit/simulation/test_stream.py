@@ -27,7 +27,7 @@ from msfp_gen.simulation.checkpoint import Checkpoint
 from msfp_gen.simulation.row_file import RowFile
 
 CLOCK = ("counter_wall_time", "provenance_build_seconds", "digest")
-PIECE = 37  # rows of a block: no run has a multiple of it
+PIECE = 71  # rows of a block: no run has a multiple of it
 
 
 @pytest.fixture(autouse=True)
@@ -56,7 +56,7 @@ def heating() -> Scene:
 
 SCENES = {
     "own steps": scene_of("fenz-test2"),
-    "even rows": scene_of("fenz-test2", output_step=0.03),
+    "even rows": scene_of("fenz-test2", output_step=0.06),
     "a planar model aslant": scene_of("fenz-test2", motion=Motion.harmonic(0.05, 0.4, direction=0.3), effects=None),
     "a stop": scene_of("fenz-test5", stop=Stop(displacement=0.06)),
 }
@@ -291,7 +291,7 @@ from msfp_gen.simulation.streamed_rows import write_blocks
 path = Path(sys.argv[1])
 result = Result.from_netcdf(path)
 count, size = len(result.history.time), path.stat().st_size
-for limit in [1, *range(1000, size, size // 10)]:
+for limit in [1, *range(1000, size, size // 5)]:
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
     rows = blocks(count, lambda start, end: taken(result.history, slice(start, end)))
     try:
@@ -308,7 +308,7 @@ def test_a_disk_that_fills_while_the_result_is_written(tmp_path: Path) -> None:
     path = preset_run("fenz-test2").to_netcdf(tmp_path / "run.nc")
     done = subprocess.run([sys.executable, "-c", FULL, str(path)], cwd=ROOT, text=True, capture_output=True)
     lines = done.stdout.splitlines()
-    assert done.returncode == 0 and len(lines) > 8, done.stderr
+    assert done.returncode == 0 and len(lines) >= 5, done.stderr
     assert all("File too large" in line and str(tmp_path / "full.nc") in line for line in lines)
     assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]
 

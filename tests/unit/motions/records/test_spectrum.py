@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from support import thinned
 
 from msfp_gen import InputError, Motion, load_scene
 from msfp_gen.motions.records import (
@@ -61,8 +63,10 @@ def test_a_step_overshoots_as_the_closed_form_says():
     assert of(found, "E1", "sd")[0] == pytest.approx((period / (2 * np.pi)) ** 2 * (1 + overshoot), rel=2e-3)
 
 
-@pytest.mark.parametrize("period", [0.05, 0.7, 8.0])
-@pytest.mark.parametrize("component", [0, 1])
+@pytest.mark.parametrize(
+    ("period", "component"),
+    thinned(product([0.05, 0.7, 8.0], [0, 1]), lambda *case: case in ((0.05, 0), (0.7, 1), (8.0, 0))),
+)
 def test_a_real_record_against_an_independent_integration(period, component):
     motion = quake()
     w, z = 2 * np.pi / period, 0.05
