@@ -12,12 +12,14 @@ import json
 import re
 import subprocess
 import sys
-from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
 from cyclonedx.schema import SchemaVersion
 from cyclonedx.validation.json import JsonStrictValidator
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from quick import QUICK, parser
 
 ROOT = Path(__file__).resolve().parents[1]
 THREE = ROOT / "msfp_gen" / "report" / "assets" / "three.min.js"
@@ -78,13 +80,16 @@ def bill(environment: Path, paths: list[Path]) -> str:
 
 
 def main() -> None:
-    """Write the file of -o."""
-    options = ArgumentParser(description=__doc__)
-    options.add_argument("environment", type=Path, help="environment with the distribution and nothing else")
-    options.add_argument("archives", type=Path, nargs="+", help="files that are published")
-    options.add_argument("-o", "--output", type=Path, required=True, help="JSON file")
+    """Write the file of -o; a quick run takes its own environment and writes nothing."""
+    options = parser(__doc__)
+    own = {"nargs": "?", "default": Path(sys.prefix)} if QUICK else {}
+    options.add_argument("environment", type=Path, help="environment with the distribution and nothing else", **own)
+    options.add_argument("archives", type=Path, nargs="*" if QUICK else "+", help="files that are published")
+    options.add_argument("-o", "--output", type=Path, required=not QUICK, help="JSON file")
     given = options.parse_args()
-    given.output.write_text(bill(given.environment, given.archives), encoding="utf-8")
+    text = bill(given.environment, given.archives)
+    if given.output is not None:
+        given.output.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
