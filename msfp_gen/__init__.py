@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene_fields import Stop as Stop
     from msfp_gen.scene.solver import Solver as Solver
     from msfp_gen.scene.top import Top as Top
-    from msfp_gen.simulation.run_any import simulate as simulate
+    from msfp_gen.simulation.simulate import simulate as simulate
     from msfp_gen.specification.layout import Auto as Auto
     from msfp_gen.specification.layout import Effects as Effects
     from msfp_gen.specification.layout import Layout as Layout
@@ -87,7 +87,7 @@ _MODULES = {
     "fit": "studies.calibration",
     "load_scene": "buildings.file",
     "presets": "scene.file.presets",
-    "simulate": "simulation.run_any",
+    "simulate": "simulation.simulate",
     "simulate_batch": "studies.batch",
     "study": "studies.study.run",
 }

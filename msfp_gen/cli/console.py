@@ -271,7 +271,7 @@ def run_scene(scene: AnyScene, **options: Any) -> tuple[Any, RunError | None]:
     """Run a scene; its result (of a failed run as far as it was computed), and the error of a failed run."""
     from msfp_gen.scene.scene import Scene
     from msfp_gen.simulation.memory import require_room
-    from msfp_gen.simulation.run_any import simulate
+    from msfp_gen.simulation.simulate import simulate
 
     if isinstance(scene, Scene):
         require_room(scene, options.get("stream"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from msfp_gen.scene.solver import Solver
     from msfp_gen.simulation.segment import Segment
     from msfp_gen.specification.layout import Effects
+
+Progress = Callable[[float, float], None]  # called with the time reached and the end of the run [s]
 
 
 def message_of(scene: Scene, segment: Segment) -> str:

@@ -1,19 +1,21 @@
 """`simulate`: runs a scene and returns its result. The time integration is compiled C.
 
-A run is one segment, or several: where a monitor trips, the next one continues with a model that includes the effect.
+The run of a bearing is one segment, or several: where a monitor trips, the next one continues with a model that has
+the effect.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, overload
 
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output
-from msfp_gen.errors import RunError
+from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
 from msfp_gen.results.history import Counters, History
@@ -22,7 +24,9 @@ from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.results.restart_state import RestartState
 from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of
 from msfp_gen.scene.effect_switching import check, next_effects, stopping_monitors
+from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import is_sprung
+from msfp_gen.simulation.building_run import simulate_building
 from msfp_gen.simulation.checkpoint import (
     EVERY,
     Checkpoint,
@@ -41,7 +45,7 @@ from msfp_gen.simulation.gradients import (
     with_gradient_errors,
 )
 from msfp_gen.simulation.memory import outgrown, require_room
-from msfp_gen.simulation.outcome import extremes_of, history_notes, landing_notes, message_of, provenance_of
+from msfp_gen.simulation.outcome import Progress, extremes_of, history_notes, landing_notes, message_of, provenance_of
 from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
 from msfp_gen.simulation.segment import Segment, start_run, start_temperatures
 from msfp_gen.simulation.settling import (
@@ -55,20 +59,51 @@ from msfp_gen.simulation.settling import (
 from msfp_gen.simulation.streamed_rows import StreamedRows
 
 if TYPE_CHECKING:
+    from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.model.compiled import Run
     from msfp_gen.model.model import Model
     from msfp_gen.scene.parameters import Parameter
-    from msfp_gen.scene.scene import Scene
     from msfp_gen.specification.layout import Effects
 
-Progress = Callable[[float, float], None]
 STEPS_PER_CALL = 4000  # of the compiled run, without the GIL; Ctrl-C, progress and checkpoints are handled in between
 CheckpointOptions = tuple[Path | None, float, bool]  # file, seconds between checkpoints, whether to resume
 NO_CHECKPOINT: CheckpointOptions = (None, EVERY, False)
 
 
+@overload
+def simulate(
+    scene: BuildingScene,
+    *,
+    progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
+    every: float = ...,
+    resume: bool = False,
+    threads: int | None = None,
+) -> BuildingResult: ...
+
+
+@overload
 def simulate(
     scene: Scene,
+    *,
+    progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
+    every: float = ...,
+    resume: bool = False,
+    strict: bool = False,
+    stream: str | Path | None = None,
+    gradients: Sequence[str] = (),
+    energy_gradients: bool = False,
+    gradient_errors: bool = True,
+) -> Result: ...
+
+
+@overload
+def simulate(scene: Scene | BuildingScene, *, progress: Progress | None = None) -> Any: ...
+
+
+def simulate(
+    scene: Scene | BuildingScene,
     *,
     progress: Progress | None = None,
     checkpoint: str | Path | None = None,
@@ -79,13 +114,15 @@ def simulate(
     gradients: Sequence[str] = (),
     energy_gradients: bool = False,
     gradient_errors: bool = True,
-) -> Result:
+    threads: int | None = None,
+) -> Result | BuildingResult:
     """Integrate a scene.
 
     Parameters
     ----------
     scene
-        Bearing, motion, top, effects, solver; see `Scene`.
+        Of a bearing or of a building; see `Scene` and `BuildingScene`. The options from `strict` to `gradient_errors`
+        are those of a bearing.
     progress
         Called repeatedly with the time reached and the end of the run [s]. An exception in it ends the run.
     checkpoint
@@ -108,10 +145,12 @@ def simulate(
     gradient_errors
         Whether the errors of the derivatives of a run that meets a rim or lifts off are measured, by another run at a
         tenth of its tolerance.
+    threads
+        For the bearings of a building; None: chosen. Results do not depend on their number.
 
     Returns
     -------
-    Result
+    Result, or BuildingResult of a building
         Rows, events, counters and notes of the run. With `stream`, of many rows a selection that fits into memory, with
         the extremes of all (`results.joining`).
 
@@ -120,13 +159,24 @@ def simulate(
     InputError
         The method does not support the effects; the rows do not fit into memory, or on the disk; the checkpoint is
         damaged, or of another scene or build; `stream` is no name of a result; a parameter does not exist, or the run
-        has no gradients.
+        has no gradients; an option is none of this scene.
     RunError
-        The run failed: the message gives time, surface and cause, `.result` has the rows until then.
+        The run failed: the message gives time, bearing, surface and cause, `.result` has the rows until then.
     OSError
         The disk is too full for the rows to be streamed.
 
     """
+    if getattr(scene, "fidelity", "") == "backbone":
+        raise InputError("fidelity = 'backbone': only studies run it, it keeps no history; give 'equivalent'")
+    if isinstance(scene, BuildingScene):
+        own = {"strict": strict, "stream": stream, "gradients": gradients, "energy_gradients": energy_gradients}
+        if unknown := [name for name, value in own.items() if value not in (False, None, ())]:
+            raise InputError(f"{unknown[0]}: the run of a building has no such option; leave it out")
+        return simulate_building(scene, progress, checkpoint, every, resume, threads)
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene: a {type(scene).__name__} is no scene; give what load_scene returns")
+    if threads is not None:
+        raise InputError("threads: the run of one bearing has no such option; leave it out")
     if checkpoint is not None and not resume:
         require_no_checkpoint(checkpoint)
     file = None if stream is None else check_output(stream, DATASET_SUFFIXES, "stream")
@@ -143,8 +193,18 @@ def simulate(
     if not result.succeeded:
         raise RunError(result.message, status=result.status, result=result)
     if gradient_errors and parameters and any(event.kind in INEXACT for event in result.events):
-        again = partial(simulate, progress=progress, strict=strict, gradients=gradients, gradient_errors=False)
-        return with_gradient_errors(result, partial(again, energy_gradients=energy_gradients))
+
+        def again(changed: Scene) -> Result:
+            return simulate(
+                changed,
+                progress=progress,
+                strict=strict,
+                gradients=gradients,
+                energy_gradients=energy_gradients,
+                gradient_errors=False,
+            )
+
+        return with_gradient_errors(result, again)
     return result
 
 

@@ -15,8 +15,7 @@ from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.memory import require_memory
-from msfp_gen.simulation.run_any import simulate
-from msfp_gen.simulation.simulate import RunSequence
+from msfp_gen.simulation.simulate import RunSequence, simulate
 from msfp_gen.studies.estimation.backbone_run import check_backbone, run_backbone
 from msfp_gen.studies.pool import SharedProgress, local_pool, raise_if_stopped, worker_count
 

@@ -151,18 +151,13 @@ SCENE = model_of(
 _REMEDIES = {"list_type": "give a list of tables", "literal_error": "give one of the known words"}
 
 
-def validate_scene(table: Mapping[str, Any]) -> Table:
-    """The table of a scene with its quantities in SI units and only the given keys; raises InputError of one line."""
-    return validate(SCENE, table)
-
-
 def validate_part(name: str, table: Mapping[str, Any]) -> Table:
-    """The same for the table `[bearing]`, `[top]` or `[solver]` alone."""
+    """The table `[bearing]`, `[top]` or `[solver]` alone, as of `validate`; raises InputError of one line."""
     return validate(_ONLY[name], {name: table})[name]  # type: ignore[no-any-return]
 
 
 def validate_suite(table: Mapping[str, Any]) -> Table:
-    """The same for the table of a suite of records: `records`, and `scale_to` with `least_share`."""
+    """The same for a suite of records: `records`, and `scale_to` with `least_share`."""
     return validate(SUITE, table)
 
 

@@ -19,7 +19,8 @@ from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_selection import slider_period
 from msfp_gen.scene.effect_switching import all_effects
-from msfp_gen.simulation.simulate import Progress, simulate
+from msfp_gen.simulation.outcome import Progress
+from msfp_gen.simulation.simulate import simulate
 from msfp_gen.specification.layout import Auto, Effects
 from msfp_gen.studies.accuracy.timed_run import CUT_OFF, Attempt, Trial, dopri5_cost, errors, largest_error, run_native
 

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 TOLERANCES = tuple(10.0**-k for k in range(2, 8))
 STEPS = (250, 1000, 4000)  # numbers of steps of models without error control
 CONFIRMING = ("Radau", (1e-4, 1e-5))  # method and tolerances that confirm the reference: the most robust of SciPy's
-Setting = float | int
 
 
 @dataclass(frozen=True)

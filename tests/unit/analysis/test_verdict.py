@@ -36,7 +36,6 @@ from msfp_gen.common.identity import fingerprint
 from msfp_gen.results.history import Event
 from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, merged, openings
-from msfp_gen.simulation.run_any import simulate as run_any
 
 OPENING = 3e-3  # [m]
 GIVEN = [limit.key for limit in LIMITS if limit.key in {field.name for field in fields(Limits)}]
@@ -230,7 +229,7 @@ def test_a_failed_run_is_not_within() -> None:
     assert judgement.text.startswith("the run failed; until then exceeded: rim force 15.12 kN, limit 1 kN (surface 1, ")
     pulled = changed_scene("fenz-test2", {"top": {"kind": "prescribed", "force": [0.0, 0.0, 1e4]}})
     with pytest.raises(RunError, match="the interface would have to pull") as caught:
-        run_any(pulled)
+        simulate(pulled)
     assert caught.value.result is None or caught.value.result.verdict.word == "failed"
 
 

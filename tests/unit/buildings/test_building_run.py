@@ -13,8 +13,8 @@ from support.buildings import BEARING, INTERFACE, LOAD, MOTION, frame, scene
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, InputError, Motion, RunError, simulate
 from msfp_gen.buildings.compiled_run import result_of, start_run
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.simulation import run_any
-from msfp_gen.simulation.run_any import simulate_building
+from msfp_gen.simulation import building_run
+from msfp_gen.simulation.building_run import simulate_building
 
 EVENTFUL = scene(frame(), duration=0.8)
 
@@ -158,7 +158,7 @@ def test_a_run_that_fails_before_its_first_row_has_no_result(monkeypatch):
         )
         return SimpleNamespace(scene=made, run=compiled, time=0.0, switch=lambda: False)
 
-    monkeypatch.setattr(run_any, "start_run", failed)
+    monkeypatch.setattr(building_run, "start_run", failed)
     with pytest.raises(RunError, match="bearing 1: stopped at t = 0 s") as caught:
         simulate(scene(frame()))
     assert caught.value.result is None

@@ -20,6 +20,7 @@ from msfp_gen import (
     Rotation,
     RunError,
     Solver,
+    load_scene,
     simulate,
 )
 from msfp_gen.buildings.result import BuildingResult
@@ -128,3 +129,8 @@ def test_messages_of_bad_bearings():
 def test_options_of_a_bearing_are_rejected(option):
     with pytest.raises(InputError, match=f"{next(iter(option))}: the run of a building has no such option"):
         simulate(scene(frame()), **option)
+
+
+def test_the_option_of_a_building_is_rejected():
+    with pytest.raises(InputError, match="threads: the run of one bearing has no such option"):
+        simulate(load_scene("fenz-test1"), threads=2)

@@ -1,83 +1,32 @@
-"""`msfp_gen.simulate`: the run of a bearing or of a building."""
+"""The run of a building: `simulate_building`."""
 
 from __future__ import annotations
 
-import inspect
 from dataclasses import replace
 from time import monotonic
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING
 
 from msfp_gen.buildings.compiled_run import BuildingRun, result_of, start_run
 from msfp_gen.buildings.dataset import scene_text
-from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.file.loader import dumps
-from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation import simulate as bearings
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, require_no_checkpoint
 from msfp_gen.simulation.outcome import provenance_of, stopped
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
-    from msfp_gen.result import Result
+    from msfp_gen.buildings.result import BuildingResult
+    from msfp_gen.buildings.scene import BuildingScene
+    from msfp_gen.simulation.outcome import Progress
 
 STEPS_PER_CALL = 20  # of a building, between two looks at interrupts, progress and checkpoints
-_OF_BUILDINGS = ("progress", "checkpoint", "every", "resume", "threads")
-
-
-@overload
-def simulate(
-    scene: BuildingScene,
-    *,
-    progress: bearings.Progress | None = None,
-    checkpoint: str | Path | None = None,
-    every: float = ...,
-    resume: bool = False,
-    threads: int | None = None,
-) -> BuildingResult: ...
-
-
-@overload
-def simulate(
-    scene: Scene,
-    *,
-    progress: bearings.Progress | None = None,
-    checkpoint: str | Path | None = None,
-    every: float = ...,
-    resume: bool = False,
-    strict: bool = False,
-    stream: str | Path | None = None,
-    gradients: Sequence[str] = (),
-    energy_gradients: bool = False,
-    gradient_errors: bool = True,
-) -> Result: ...
-
-
-@overload
-def simulate(scene: Scene | BuildingScene, *, progress: bearings.Progress | None = None) -> Any: ...
-
-
-def simulate(scene: Scene | BuildingScene, **options: Any) -> Result | BuildingResult:
-    """As `simulation.simulate.simulate`, whose text is shown; a `BuildingScene` gives a `BuildingResult`."""
-    if getattr(scene, "fidelity", "") == "backbone":
-        raise InputError("fidelity = 'backbone': only studies run it, it keeps no history; give 'equivalent'")
-    if not isinstance(scene, BuildingScene):
-        if not isinstance(scene, Scene):
-            raise InputError(f"scene: a {type(scene).__name__} is no scene; give what load_scene returns")
-        return bearings.simulate(scene, **options)
-    for name, value in options.items():
-        if name not in _OF_BUILDINGS and value not in (False, None, ()):
-            raise InputError(f"{name}: the run of a building has no such option; leave it out")
-    return simulate_building(scene, **{name: options[name] for name in _OF_BUILDINGS if name in options})
 
 
 def simulate_building(
     scene: BuildingScene,
-    progress: bearings.Progress | None = None,
+    progress: Progress | None = None,
     checkpoint: str | Path | None = None,
     every: float = EVERY,
     resume: bool = False,
@@ -116,7 +65,7 @@ def simulate_building(
     return result
 
 
-def _advance(run: BuildingRun, progress: bearings.Progress | None, keeper: Checkpoint | None) -> bool:
+def _advance(run: BuildingRun, progress: Progress | None, keeper: Checkpoint | None) -> bool:
     """Take all steps; True after Ctrl-C."""
     try:
         while run.run.advance(STEPS_PER_CALL) or run.switch():
@@ -140,11 +89,3 @@ def identity(run: BuildingRun) -> Identity:
     """The identity of the run of a building, for its checkpoint."""
     motion = {"name": run.scene.motion.name, "duration": run.scene.motion.duration}
     return Identity(run.build, scene_text(run.scene) + dumps({"motion": motion}), fingerprint(run.scene))
-
-
-_ADDED = """
-    Of a `BuildingScene`: its `BuildingResult`, with the options progress, checkpoint, every, resume, and threads:
-    for its bearings, None: chosen. Results do not depend on their number.
-"""
-simulate.__doc__ = f"{bearings.simulate.__doc__}{_ADDED}"
-simulate.__signature__ = inspect.signature(bearings.simulate)  # type: ignore[attr-defined]
