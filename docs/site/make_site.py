@@ -20,8 +20,11 @@ from tempfile import TemporaryDirectory
 SITE = Path(__file__).resolve().parent
 ROOT = SITE.parents[1]
 # Pages outside docs/, and files that pages link to.
-PAGES = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")
-FILES = ("LICENSE", "CITATION.cff", "examples", "docs/figures")
+PAGES = (
+    "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "ROADMAP.md", "SECURITY.md", "CODE_OF_CONDUCT.md",
+    "benchmarks/README.md",
+)  # fmt: skip
+FILES = ("LICENSE", "CITATION.cff", "examples", "docs/figures", ".github/workflows")
 SOURCES = r"\]\(\.\./((?:generator|msfp_gen)/[^)#]+)\)"  # links of pages to the code
 # A link to a folder or to an example leads to the gallery, where there is one.
 GALLERY_LINKS = {"](examples)": "](gallery/index)", "](../examples)": "](../gallery/index)"}

@@ -237,3 +237,22 @@ def test_every_number_of_the_paper_has_its_page() -> None:
     stated = set(re.findall(r"\d[\d.]*(?:e-?\d+)?", " ".join(FIGURES)))
     assert {number.rstrip(".") for number in numbers} <= {number.rstrip(".") for number in stated} | {"2e-3"}
     assert "RMS force error 2e-3" in (ROOT / "docs" / "performance.md").read_text(encoding="utf-8")
+
+
+# ---- other pages -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["ROADMAP.md", "SECURITY.md", "CODE_OF_CONDUCT.md"])
+def test_links_of_the_pages_beside_the_readme_lead_somewhere(name: str) -> None:
+    links = re.findall(r"\]\((?!https:)([^)#]+)", (ROOT / name).read_text(encoding="utf-8"))
+    assert not [link for link in links if not (ROOT / link).exists()]
+
+
+def test_the_checklist_has_the_criteria_of_the_badge_once_each() -> None:
+    """67 at the level "passing"; every row has a state."""
+    page = (ROOT / "docs" / "checklists.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([a-z_0-9, ]+) \| [MS+, ]* ?\| (.+?) \|", page.partition("## OpenSSF")[2], re.MULTILINE)
+    criteria = [name for names, state in rows if state != "state" for name in names.split(", ")]
+    assert len(criteria) == len(set(criteria)) == 67
+    states = {state.partition(",")[0] for _, state in rows} - {"state"}
+    assert states == {"met", "not met", "open", "does not apply", "do not apply", "met once released"}
