@@ -250,7 +250,8 @@ def test_links_of_the_pages_beside_the_readme_lead_somewhere(name: str) -> None:
 
 def test_the_checklist_has_the_criteria_of_the_badge_once_each() -> None:
     """67 at the level "passing"; every row has a state."""
-    page = (ROOT / "docs" / "checklists.md").read_text(encoding="utf-8")
+    # Escaped in the page where an identifier looks like the name of a test.
+    page = (ROOT / "docs" / "checklists.md").read_text(encoding="utf-8").replace("\\_", "_")
     rows = re.findall(r"^\| ([a-z_0-9, ]+) \| [MS+, ]* ?\| (.+?) \|", page.partition("## OpenSSF")[2], re.MULTILINE)
     criteria = [name for names, state in rows if state != "state" for name in names.split(", ")]
     assert len(criteria) == len(set(criteria)) == 67
