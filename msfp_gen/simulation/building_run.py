@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from msfp_gen.buildings.compiled_run import BuildingRun, result_of, start_run
 from msfp_gen.buildings.dataset import scene_text
 from msfp_gen.common.identity import fingerprint
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.errors import RunError
 from msfp_gen.scene.file.loader import dumps
-from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, require_no_checkpoint
+from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity
 from msfp_gen.simulation.outcome import provenance_of, stopped
 
 if TYPE_CHECKING:
@@ -39,10 +39,6 @@ def simulate_building(
     `result` has the rows until then, as after an interrupt; None before the first row.
     """
     begin = monotonic()
-    if checkpoint is None and resume:
-        raise InputError("resume: needs the checkpoint to resume from; give checkpoint")
-    if checkpoint is not None and not resume:
-        require_no_checkpoint(checkpoint)
     run = start_run(scene, threads)
     keeper = None if checkpoint is None else Checkpoint(checkpoint, identity(run), every, resume)
     if keeper is not None:

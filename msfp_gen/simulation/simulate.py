@@ -168,6 +168,10 @@ def simulate(
     """
     if getattr(scene, "fidelity", "") == "backbone":
         raise InputError("fidelity = 'backbone': only studies run it, it keeps no history; give 'equivalent'")
+    if checkpoint is None and resume:
+        raise InputError("resume: needs the checkpoint to resume from; give checkpoint")
+    if checkpoint is not None and not resume:
+        require_no_checkpoint(checkpoint)
     if isinstance(scene, BuildingScene):
         own = {"strict": strict, "stream": stream, "gradients": gradients, "energy_gradients": energy_gradients}
         if unknown := [name for name, value in own.items() if value not in (False, None, ())]:
@@ -177,8 +181,6 @@ def simulate(
         raise InputError(f"scene: a {type(scene).__name__} is no scene; give what load_scene returns")
     if threads is not None:
         raise InputError("threads: the run of one bearing has no such option; leave it out")
-    if checkpoint is not None and not resume:
-        require_no_checkpoint(checkpoint)
     file = None if stream is None else check_output(stream, DATASET_SUFFIXES, "stream")
     parameters = gradient_parameters(scene, gradients, checkpoint, stream, energy_gradients)
     require_room(scene, file, copies=1 + len(parameters))

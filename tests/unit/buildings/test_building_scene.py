@@ -134,3 +134,9 @@ def test_options_of_a_bearing_are_rejected(option):
 def test_the_option_of_a_building_is_rejected():
     with pytest.raises(InputError, match="threads: the run of one bearing has no such option"):
         simulate(load_scene("fenz-test1"), threads=2)
+
+
+def test_nothing_to_resume_from_is_rejected():
+    for given in (load_scene("fenz-test1"), scene(frame())):
+        with pytest.raises(InputError, match="resume: needs the checkpoint to resume from; give checkpoint"):
+            simulate(given, resume=True)
