@@ -19,8 +19,10 @@ from drawing import Array
 from scipy.optimize import brentq
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top, simulate
+from msfp_gen.scene.backbone import series_links
 from msfp_gen.scene.scene_fields import InitialState
 from msfp_gen.studies.accuracy.models import run_opensees
+from msfp_gen.studies.accuracy.opensees import YIELD as LEAST_YIELD
 from msfp_gen.studies.accuracy.timed_run import comparison_times
 
 DATA = Path(__file__).with_name("data")
@@ -216,8 +218,11 @@ ORBIT = np.linspace(0.0, 2 * np.pi, 25)  # of the orbit [rad]
 FLAT_LOAD = 1e6  # [N]
 
 
-def single_element(radius: float, law: str, *numbers: float) -> Any:
-    """OpenSees with a `singleFPBearing` between nodes 1 and 2 under `FLAT_LOAD`; numbers: of its friction law."""
+def single_element(radius: float, law: str, *numbers: float, options: Sequence[str] = ()) -> Any:
+    """OpenSees with a `singleFPBearing` between nodes 1 and 2 under `FLAT_LOAD`.
+
+    numbers: of its friction law; options: further ones of the element.
+    """
     ops = import_module("openseespy.opensees")
     ops.wipe()
     ops.model("basic", "-ndm", 3, "-ndf", 6)
@@ -230,7 +235,9 @@ def single_element(radius: float, law: str, *numbers: float) -> Any:
     stiffness = numbers[0] * FLAT_LOAD / YIELD + FLAT_LOAD / radius
     axes = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
     materials = ("-P", 1, "-T", 1, "-My", 1, "-Mz", 1)
-    ops.element("singleFPBearing", 1, 1, 2, 1, radius, stiffness, *materials, "-orient", *axes, "-iter", 100, 1e-4)
+    ops.element(
+        "singleFPBearing", 1, 1, 2, 1, radius, stiffness, *materials, "-orient", *axes, *options, "-iter", 100, 1e-4
+    )
     ops.timeSeries("Constant", 1)
     ops.pattern("Plain", 1, 1)
     ops.load(2, 0.0, 0.0, -FLAT_LOAD, 0.0, 0.0, 0.0)
@@ -273,9 +280,9 @@ def ground() -> Array:
     return start[:, None] * np.column_stack([2.5 * np.sin(2 * np.pi * 0.6 * GROUND), 1.5 * np.sin(2 * np.pi * GROUND)])
 
 
-def shaken_mass_of_opensees(radius: float, law: str, *numbers: float) -> Array:
+def shaken_mass_of_opensees(radius: float, law: str, *numbers: float, options: Sequence[str] = ()) -> Array:
     """Forces of the element on a mass on a shaken base, at `GROUND`, shape (k, 2) [N]."""
-    ops = single_element(radius, law, *numbers)
+    ops = single_element(radius, law, *numbers, options=options)
     ops.integrator("LoadControl", 1.0)
     ops.analysis("Static")
     assert ops.analyze(1) == 0
@@ -302,6 +309,10 @@ def shaken_mass_of_opensees(radius: float, law: str, *numbers: float) -> Array:
     return forces
 
 
+# OpenSeesPy 3.7.1 reads the option for vertical displacement with this spelling only; others it passes over in silence.
+LIFTED = "-inclVertdisp"
+
+
 def opensees_shaken() -> Iterator[Series]:
     """A mass on one bearing on a base shaken in two directions, with constant friction and by velocity."""
     source = "OpenSees singleFPBearing, transient"
@@ -311,21 +322,21 @@ def opensees_shaken() -> Iterator[Series]:
         ("friction by velocity", "VelDependent", (0.03, 0.06, 20.0), slow, "velocity"),
     ):
         for radius in (2.0, 4.0):
-            reference = shaken_mass_of_opensees(radius, law, *numbers)
             bearing = point_on_a_dish(radius, 0.06, 0.9 * radius, YIELD)
             bearing = bearing.replace(**{key: [value] for key, value in values.items()})
             effects = Effects(rims=False, bouc_wen="plastic", friction=word)
             motion = Motion.from_acceleration(GROUND, np.column_stack([ground(), 0 * GROUND]))
             top = Top.mass(FLAT_LOAD / 9.81, 1e-3, 0.0)
             history = simulate(Scene(bearing, motion, top, effects, Solver(rtol=1e-5), output_step=0.05)).history
-            every = np.arange(4, len(history.time), 4)
-            for axis in range(2):
-                points = [
-                    Point(f"{history.time[i]:.2f} s", reference[50 * i, axis], float(history.top_force[i, axis]))
-                    for i in every
-                ]
-                label = f"mass on a shaken base, R {radius:g} m, {name}"
-                yield Series(label, source, "program", f"force along E{axis + 1} [N]", points)
+            label = f"mass on a shaken base, R {radius:g} m, {name}"
+            for suffix, options in (("", ()), (", with vertical displacement", (LIFTED,))):
+                reference = shaken_mass_of_opensees(radius, law, *numbers, options=options)
+                for axis in range(2):
+                    points = [
+                        Point(f"{history.time[i]:.2f} s", reference[50 * i, axis], float(history.top_force[i, axis]))
+                        for i in range(4, len(history.time), 4)
+                    ]
+                    yield Series(label, source + suffix, "program", f"force along E{axis + 1} [N]", points)
 
 
 def opensees_single() -> Iterator[Series]:
@@ -379,22 +390,35 @@ def device_points() -> Iterator[Series]:
 
 
 def opensees_triple(scenes: Sequence[Scene], steps: int) -> Iterator[Series]:
-    """Forces of OpenSees' `TripleFrictionPendulum` along whole runs; ours with friction at the pivot, as there."""
+    """Forces of OpenSees' `TripleFrictionPendulum` along whole runs; ours with friction at the pivot, as there.
+
+    Then ours with the yield displacement of the element too: that of the bearing as a whole, where two surfaces slide.
+    """
+    source = "OpenSees TripleFrictionPendulum, ours with friction at the pivot"
     for scene in scenes:
         theirs = run_opensees(scene, steps)
         assert theirs.status == "ok", theirs.message
         at, pick = comparison_times(scene.end), slice(len(theirs.force) // 24, None, len(theirs.force) // 24)
         friction = [surface.friction for surface in scene.bearing.surfaces]
-        pivot = replace(scene, bearing=scene.bearing.replace(friction=friction, friction_at="pivot"))
-        history = simulate(replace(pivot, output_step=float(at[1]))).history
-        for axis in range(2):
-            ours = history.top_force[: len(at), axis]
-            if not np.any(theirs.force[:, axis]):
-                continue
-            rows = zip(at[pick], theirs.force[pick, axis], ours[pick], strict=True)
-            points = [Point(f"{t:.3f} s", float(one), float(two)) for t, one, two in rows]
-            source = "OpenSees TripleFrictionPendulum"
-            yield Series(scene.name, source, "program", f"force along E{axis + 1} [N]", points)
+        pivot = scene.bearing.replace(friction=friction, friction_at="pivot")
+        equal = pivot.replace(yield_displacement=shared_yield(scene.bearing))
+        for suffix, bearing in (("", pivot), (" and the yield displacement of the element", equal)):
+            history = simulate(replace(scene, bearing=bearing, output_step=float(at[1]))).history
+            for axis in range(2):
+                ours = history.top_force[: len(at), axis]
+                if not np.any(theirs.force[:, axis]):
+                    continue
+                rows = zip(at[pick], theirs.force[pick, axis], ours[pick], strict=True)
+                points = [Point(f"{t:.3f} s", float(one), float(two)) for t, one, two in rows]
+                yield Series(scene.name, source + suffix, "program", f"force along E{axis + 1} [N]", points)
+
+
+def shared_yield(bearing: Bearing) -> list[float]:
+    """Yield displacements with which every surface moves the top plate by half of that of the element [m]."""
+    links = sorted(series_links(bearing, rims=True, arms=False), key=lambda link: link.surface)
+    half = max(LEAST_YIELD, min(link.yielding for link in links)) / 2
+    surfaces = bearing.surfaces
+    return [half * one.yield_displacement / link.yielding for one, link in zip(surfaces, links, strict=True)]
 
 
 def here() -> Iterator[Series]:

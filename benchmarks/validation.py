@@ -24,6 +24,7 @@ sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests")]  # closed forms a
 
 import devices  # noqa: E402
 import external  # noqa: E402
+import outside  # noqa: E402
 from drawing import MILLI, Array, closed_form  # noqa: E402
 from reference import friction_laws as law_reference  # noqa: E402
 from results_page import TABLE_42, closed_transitions, row, table  # noqa: E402
@@ -56,6 +57,7 @@ STEPS = pick(8000, 500)  # of OpenSees in a run
 SCRIPT = "python benchmarks/validation.py"
 RESULTS = ROOT / "benchmarks" / "results"
 POINTS, HISTORY = RESULTS / "comparisons.csv", RESULTS / "validation.csv"
+UNRELEASED = "unreleased"
 SERIES_HEAD = ("case", "compared with", "kind", "quantity", "within", "tolerance", "largest", "RMS")
 
 
@@ -88,7 +90,7 @@ class Case(NamedTuple):
 
 def cases(opensees: bool = True) -> list[Case]:
     """All rows; without those of OpenSees where it is not to be run."""
-    found = [*table_42(), *loops(), *device_pushes(), *laws(), *heating(), *pendulum()]
+    found = [*table_42(), *loops(), *stiff(), *device_pushes(), *laws(), *heating(), *pendulum()]
     return [*found, *programs()] if opensees else found
 
 
@@ -125,6 +127,24 @@ def loops() -> Iterator[Case]:
         source = "friction circles" + (", Sarlis and Constantinou 2016" if name == "unusual-tfp" else "")
         reference, ours = closed_form(result, tip)[0], result.summary["peak_force_ratio"]
         yield Case(f"`{name}`", source, "closed form", "F/N, tip", reference, ours, 4, f"msfp-gen run {name}")
+
+
+def stiff() -> Iterator[Case]:
+    """What the yield displacement alone sets apart from the closed forms, with a tenth of it."""
+    source = "friction circles, ours with a tenth of the yield displacement"
+    for name, rtol in (("fenz-monotonic", FINE), ("fenz-test1", None)):
+        scene = load_scene(name)
+        tenth = [surface.yield_displacement / 10 for surface in scene.bearing.surfaces]
+        solver = scene.solver if rtol is None else replace(scene.solver, rtol=rtol)
+        result = simulate(replace(scene, bearing=scene.bearing.replace(yield_displacement=tenth), solver=solver))
+        if name == "fenz-test1":
+            tip = np.array([result.summary["peak_displacement"]["radial"]])
+            reference, ours = closed_form(result, tip)[0], result.summary["peak_force_ratio"]
+            yield Case(f"`{name}`", source, "closed form", "F/N, tip", reference, ours, 4, SCRIPT)
+        else:
+            key = "u_star_star"
+            reference, ours = MILLI * closed_transitions(result)[key], MILLI * result.summary["transitions"][key]
+            yield Case("monotonic push", source, "closed form", TABLE_42[key][0], reference, ours, 1, SCRIPT)
 
 
 def device_pushes() -> Iterator[Case]:
@@ -262,16 +282,22 @@ def points(rows: list[Case], found: list[external.Series]) -> str:
     return out.getvalue()
 
 
+def label() -> str:
+    """Of the row of this code in `HISTORY`: its version, or `unreleased` where the changelog goes beyond the version."""
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    return UNRELEASED if "\n## Unreleased\n" in changes else __version__
+
+
 def history(text: str) -> list[dict[str, str]]:
-    """Rows of `HISTORY`, the one of this version from the comparisons `text`: number, and within their tolerance."""
+    """Rows of `HISTORY`, the one of this code from the comparisons `text`: number, and within their tolerance."""
     rows = list(csv.DictReader(HISTORY.read_text(encoding="utf-8").splitlines())) if HISTORY.exists() else []
     found = list(csv.DictReader(text.splitlines()))
-    now = {"version": __version__, "date": f"{date.today()}", "comparisons": str(len(found))}
+    now = {"version": label(), "date": f"{date.today()}", "comparisons": str(len(found))}
     now["within"] = str(sum(abs(float(one["difference"])) <= float(one["tolerance"]) for one in found))
     for kind in external.TOLERANCE:
         off = [float(one["difference"]) for one in found if one["kind"] == kind]
         now[f"rms, {kind}"] = f"{np.sqrt(np.mean(np.square(off))):.2%}"
-    return [*(one for one in rows if one["version"] != __version__), now]
+    return [*(one for one in rows if one["version"] not in (label(), UNRELEASED)), now]
 
 
 def line(case: Case) -> str:
@@ -287,20 +313,23 @@ def versions() -> str:
     return f"openseespy {metadata.version('openseespy')} ({STEPS} steps in every run; Python {sys.version_info[0]}.{sys.version_info[1]})"
 
 
-def page(rows: list[Case], found: list[external.Series], past: list[dict[str, str]]) -> str:
-    """Text of docs/validation.md."""
-    text = TEMPLATE.read_text(encoding="utf-8")
+def page(rows: list[Case], found: list[external.Series], past: list[dict[str, str]], text: str) -> str:
+    """Text of docs/validation.md; text: every comparison, from `points`."""
+    comparisons = list(csv.DictReader(text.splitlines()))
+    filled = TEMPLATE.read_text(encoding="utf-8")
     for name, value in {
         "table": table(HEAD, [line(case) for case in rows]),
         "series": table(SERIES_HEAD, [series_line(one) for one in found]),
+        "outside": "" if QUICK else outside.causes(comparisons),  # steps of a quick run have causes of their own
+        "beyond": str(len(outside.outside(comparisons))),
         "history": table(tuple(past[-1]), [row(*one.values()) for one in past]),
         "count": past[-1]["comparisons"],
         "within": past[-1]["within"],
         "programs": versions(),
         "date": f"{date.today()}",
     }.items():
-        text = text.replace(f"{{{name}}}", value)
-    return text
+        filled = filled.replace(f"{{{name}}}", value)
+    return filled
 
 
 def main(folder: Path) -> None:
@@ -308,7 +337,7 @@ def main(folder: Path) -> None:
     text = points(rows, found)
     past = history(text)
     with replacing(folder / "validation.md") as temporary:
-        temporary.write_text(page(rows, found, past), encoding="utf-8")
+        temporary.write_text(page(rows, found, past, text), encoding="utf-8")
     if QUICK:
         return
     with replacing(POINTS) as temporary:
