@@ -1,6 +1,7 @@
 /* building.h: what the files of the run of a building share. */
 #ifndef BUILDING_H
 #define BUILDING_H
+/* POSIX reserves the name for this. NOLINTNEXTLINE(bugprone-reserved-identifier,cert-dcl37-c,cert-dcl51-cpp) */
 #define _POSIX_C_SOURCE 200809L
 #include <pthread.h>
 #include "msfp_building.h"

@@ -22,25 +22,39 @@ double dot(int n, const double *x, const double *y)
     return sum;
 }
 
+static void release(linear *l)
+{
+    free(l->factors);
+    free(l->follow);
+    free(l->mobility);
+    free(l->mobility_factors);
+    *l = (linear){ 0 };
+}
+
+/* All arrays or, where memory ends, none. */
 static int allocate(linear *l, size_t n, size_t r)
 {
     if (l->factors)
         return MSFP_OK;
-    l->factors = malloc(n * n * sizeof(double));
-    l->follow = malloc(n * r * sizeof(double));
-    l->mobility = malloc(r * r * sizeof(double));
-    l->mobility_factors = malloc(r * r * sizeof(double));
-    return l->factors && l->follow && l->mobility && l->mobility_factors ? MSFP_OK : MSFP_E_MEMORY;
+    linear arrays = {
+        .used = l->used,
+        .factors = malloc(n * n * sizeof(double)),
+        .follow = malloc(n * r * sizeof(double)),
+        .mobility = malloc(r * r * sizeof(double)),
+        .mobility_factors = malloc(r * r * sizeof(double)),
+    };
+    if (!arrays.factors || !arrays.follow || !arrays.mobility || !arrays.mobility_factors) {
+        release(&arrays);
+        return MSFP_E_MEMORY;
+    }
+    *l = arrays;
+    return MSFP_OK;
 }
 
 void linear_free(msfp_building *b)
 {
-    for (int k = 0; k < FACTORS; ++k) {
-        free(b->linear[k].factors);
-        free(b->linear[k].follow);
-        free(b->linear[k].mobility);
-        free(b->linear[k].mobility_factors);
-    }
+    for (int k = 0; k < FACTORS; ++k)
+        release(&b->linear[k]);
 }
 
 /* The factors at that beta, or those that have not been used for longest. */

@@ -47,7 +47,7 @@ void begin_peaks(msfp_building *b)
         *at++ = -INFINITY;
         for (int k = 0; k < 2 * count; ++k)
             *at++ = k < count ? INFINITY : -INFINITY;
-        for (double *end = peaks_of(b, i) + of_bearing(b, i); at < end; ++at)
+        for (const double *end = peaks_of(b, i) + of_bearing(b, i); at < end; ++at)
             *at = 0.0;
     }
 }

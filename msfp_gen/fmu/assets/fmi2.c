@@ -288,18 +288,18 @@ FMI2_EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2V
 
 /* Steps never end later: what a pending step would be asked. */
 #define STATUS(Function, type, known, result, is_not)                                                                  \
-    FMI2_EXPORT fmi2Status fmi2Get##Function(fmi2Component c, const fmi2StatusKind kind, type *value)                  \
+    FMI2_EXPORT fmi2Status fmi2Get##Function(fmi2Component c, const fmi2StatusKind kind, type value)                   \
     {                                                                                                                  \
         REQUIRE(ANY);                                                                                                  \
-        if (kind != known || !value)                                                                                   \
+        if (kind != (known) || !value)                                                                                 \
             return (fmi2Status)fmu_fail(f, FMU_ERROR, "%s: kind %d " is_not, __func__, (int)kind);                     \
-        *value = result;                                                                                               \
+        *value = (result);                                                                                             \
         return fmi2OK;                                                                                                 \
     }
-STATUS(Status, fmi2Status, fmi2DoStepStatus, fmi2OK, "has no status")
-STATUS(RealStatus, fmi2Real, fmi2LastSuccessfulTime, f->values[FMU_TIME], "is no number")
-STATUS(BooleanStatus, fmi2Boolean, fmi2Terminated, 0, "is no Boolean")
-STATUS(StringStatus, fmi2String, fmi2PendingStatus, "", "is no text")
+STATUS(Status, fmi2Status *, fmi2DoStepStatus, fmi2OK, "has no status")
+STATUS(RealStatus, fmi2Real *, fmi2LastSuccessfulTime, f->values[FMU_TIME], "is no number")
+STATUS(BooleanStatus, fmi2Boolean *, fmi2Terminated, 0, "is no Boolean")
+STATUS(StringStatus, fmi2String *, fmi2PendingStatus, "", "is no text")
 
 FMI2_EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
 {

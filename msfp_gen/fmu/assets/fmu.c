@@ -13,7 +13,7 @@ fmu_status fmu_fail(const fmu *f, fmu_status status, const char *format, ...)
     char text[FMU_TEXT];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    (void)vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     if (f->log)
         f->log(f, status, status == FMU_DISCARD ? "logStatusDiscard" : "logStatusError", text);
@@ -33,7 +33,7 @@ fmu *fmu_new(const char *name, const char *token, int exchange, fmu_logger log, 
     const size_t length = name ? strlen(name) : 0;
     f->name = calloc(length + 1, 1);
     if (f->name && length)
-        memcpy(f->name, name, length);
+        memcpy(f->name, name, length + 1);
     if (!f->name || !length || !token || strcmp(token, FMU_TOKEN) != 0) {
         if (f->name)
             fmu_fail(f, FMU_ERROR, length ? "the token is not that of this unit: give the one of its modelDescription.xml"

@@ -129,7 +129,7 @@ double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const do
 int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, msfp_solution *out)
 {
     double residual[DOF], tangent[DOF * DOF], g[NB][2], last = INFINITY;
-    int pivots[DOF], good = 0, worst;
+    int pivots[DOF], worst;
     msfp_seed seed = { .ca = 1.0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     memcpy(g, at->f, sizeof g);
@@ -146,7 +146,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
         /* Converged, or at the floor that rounding leaves; a step is taken all the same, for the determinant. */
         if ((out->iterations && out->residual <= 1e-13) || (out->residual <= 1e-9 && out->residual >= 0.5 * last))
             return MSFP_OK;
-        good = out->residual < 1e-2 * last;
+        const int good = out->residual < 1e-2 * last;
         last = out->residual;
         if (!first && !good && (status = msfp_condensed(p, at, &seed, w, g, residual, tangent)))
             return status;

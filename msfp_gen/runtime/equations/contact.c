@@ -23,7 +23,7 @@ enum {
 };
 #if MSFP_MEMORY
 #define SLOPE(out, s)                                                                                                  \
-    (out)[MSFP_CONTACT_LAW_MU * LANES + s] /* d mu/d mu by the law, because friction heats the surface */
+    (out)[MSFP_CONTACT_LAW_MU * LANES + (s)] /* d mu/d mu by the law, because friction heats the surface */
 #else
 #define SLOPE(out, s) 0.0
 #endif

@@ -26,7 +26,7 @@ enum { INPUTS = MSFP_LOCAL_SIZE };
 #if MSFP_GRADIENTS
 #define RATE_ROW(w, j, i) (w)->drates[j][i]
 #else
-#define RATE_ROW(w, j, i) NULL
+#define RATE_ROW(w, j, i) (w)->dnormal[j] /* there are no such rows */
 #endif
 static const double no_twist[TWIST]; /* columns are derivatives at zero twist */
 

@@ -37,7 +37,7 @@ MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_colum
 {
     const msfp_point_columns *dat = ds->point;
     put_coordinates(d->x[0], dat->base[0] + 3, dat->base[1] + 3, dat->base[2] + 3);
-    const int moves = dat->base_moves || memcmp(dp->body[0], constant, sizeof constant);
+    const int moves = dat->base_moves || memcmp(dp->body[0], constant, sizeof constant) != 0;
     if (moves) { /* with few parameters only */
         memset(ds->frame, 0, sizeof ds->frame);
         msfp_put_polar(ds->frame + MSFP_BODY_CX * C, dat->base[0]);

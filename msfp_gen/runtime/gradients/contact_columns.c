@@ -98,6 +98,8 @@ MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_seed *seed,
         memcpy(slopes->of, jacobian, (size_t)rows * sizeof *jacobian);
         return;
     }
+#else
+    (void)seed;
 #endif
     eliminate(out + MSFP_CONTACT_DY * LANES, stage + MSFP_STAGE_TAU * LANES, rows, jacobian, slopes->of);
 }

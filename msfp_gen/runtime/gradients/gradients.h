@@ -303,10 +303,10 @@ void msfp_memory_state_columns(const msfp_state *s, const msfp_state_columns *df
 
 /* ---- observation.c, work_columns.c: works of the energy balance, where they are asked for ---- */
 
-/* Columns of the powers at the evaluation in `w`, with all results of its contacts, into `ds`. */
+/* Columns of the powers at the evaluation in `w`, with all results of its contacts, into `to`. */
 void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
-                            msfp_state_columns *ds);
+                            msfp_state_columns *to);
 /* Columns of the powers of the present state, at the point and evaluation of msfp_initial_columns. */
 void msfp_initial_works(msfp_run *run, msfp_group *group, const msfp_point *at, const msfp_seed *seed,
                         const double g[MSFP_NB][2]);

@@ -69,7 +69,7 @@ int msfp_record_present_columns(msfp_run *run, int first)
 {
     struct msfp_gradients *g = run->gradients;
     msfp_columns *d = g->recording.row;
-    if (reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE))
+    if (reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE)) /* NOLINT(-Wanalyzer-malloc-leak): kept in g */
         return MSFP_E_MEMORY;
     for (int i = 0; i < g->groups; ++i) {
         msfp_group *group = &g->group[i];
@@ -102,7 +102,7 @@ static const msfp_columns *row_columns(msfp_run *run, msfp_group *group, double 
 int msfp_record_rows_columns(msfp_run *run)
 {
     struct msfp_gradients *g = run->gradients;
-    if (reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE))
+    if (reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE)) /* NOLINT(-Wanalyzer-malloc-leak): kept in g */
         return MSFP_E_MEMORY;
     for (int i = 0; i < g->groups; ++i) {
         g->recording.columns_known = 0;
@@ -116,7 +116,7 @@ int msfp_record_rows_columns(msfp_run *run)
 int msfp_record_extremes_columns(msfp_run *run)
 {
     struct msfp_gradients *g = run->gradients;
-    if (reserve(g, &g->events, run->event_count, &g->event_capacity, EVENT))
+    if (reserve(g, &g->events, run->event_count, &g->event_capacity, EVENT)) /* NOLINT(-Wanalyzer-malloc-leak): kept in g */
         return MSFP_E_MEMORY;
     for (int i = 0; i < g->groups; ++i) {
         msfp_group *group = &g->group[i];

