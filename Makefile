@@ -10,7 +10,7 @@ PEERS  := $(VENV)/.peers
 # Hundreds of processes of the tests import the same modules: they are compiled once, also where images forbid it.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test slow lint types package wheels processors bounds clang zig fuzz mutants figures docs clean
+.PHONY: demo test slow lint types analyse package wheels processors bounds clang zig fuzz mutants figures docs clean
 
 demo: $(RUNS)
 	$(BIN)/msfp-gen demo -o out
@@ -28,6 +28,10 @@ lint: $(STAMP)
 
 types: $(STAMP)
 	$(BIN)/mypy
+
+# gcc -fanalyzer, clang-tidy and cppcheck on the C code, as a compiler reads it. See docs/checks.md.
+analyse: $(STAMP)
+	$(BIN)/python tools/analyse.py
 
 # The sdist and the wheel, each built, installed and run outside the checkout.
 package: $(STAMP)
