@@ -55,21 +55,21 @@ def record(duration: float, axes: tuple[int, ...] = (1, 1, 1)) -> tuple[Array, M
     return found, Motion.from_acceleration(times, found)
 
 
-def floors(mass: float, frequency: float, width: float) -> list[BaseSlab | Storey]:
-    """A base and three storeys of that whole mass; each storey would swing at the frequency on its own columns [Hz]."""
-    plan = mass * width**2 / 6
-    stiffness = 0.2 * mass * (2 * np.pi * frequency) ** 2
+def floors(mass: float, frequency: float, width: float, storeys: int = 3) -> list[BaseSlab | Storey]:
+    """A base and storeys of that whole mass; each storey would swing at the frequency on its own columns [Hz]."""
+    plan, share = mass * width**2 / 6, 0.6 / storeys
+    stiffness = share * mass * (2 * np.pi * frequency) ** 2
     storey = Storey(
         height=3.5,
-        mass=0.2 * mass,
-        inertia=(0.1 * plan, 0.1 * plan, 0.2 * plan),
+        mass=share * mass,
+        inertia=(share / 2 * plan, share / 2 * plan, share * plan),
         stiffness=stiffness,
         torsional_stiffness=stiffness * width**2 / 6,
         mass_centre=(0.05 * width, 0.0),
-        vertical_stiffness=0.2 * mass * (2 * np.pi * 15.0) ** 2,
-        rocking_stiffness=0.2 * mass * (2 * np.pi * 15.0) ** 2 * width**2 / 6,
+        vertical_stiffness=share * mass * (2 * np.pi * 15.0) ** 2,
+        rocking_stiffness=share * mass * (2 * np.pi * 15.0) ** 2 * width**2 / 6,
     )
-    return [BaseSlab(0.4 * mass, (0.2 * plan, 0.2 * plan, 0.4 * plan)), *3 * [storey]]
+    return [BaseSlab(0.4 * mass, (0.2 * plan, 0.2 * plan, 0.4 * plan)), *storeys * [storey]]
 
 
 def frame(parts: list[BaseSlab | Storey]) -> Building:
@@ -85,10 +85,10 @@ def grid(count: int) -> list[tuple[float, float]]:
     return [(SPACING * i - middle, SPACING * j - middle) for i in range(side) for j in range(side)]
 
 
-def tower(count: int, duration: float, solver: Solver | None = None) -> BuildingScene:
+def tower(count: int, duration: float, solver: Solver | None = None, storeys: int = 3) -> BuildingScene:
     """A frame on so many triple pendulums (preset prototype-tfp), each below 112 kN, under all components."""
     bearing = presets.bearing("prototype-tfp").replace(contact_damping=1e-4)
-    parts = floors(count * 112e3 / bearing.gravity, 2.0, SPACING * count**0.5)
+    parts = floors(count * 112e3 / bearing.gravity, 2.0, SPACING * count**0.5, storeys)
     interface = Top.node(1e7, 2e8, 1e6, 1e4, 4e5, 1e3)
     bearings = [BuildingBearing(bearing, interface, place) for place in grid(count)]
     return BuildingScene(frame(parts), bearings, record(duration)[1], solver or Solver())
@@ -112,11 +112,11 @@ def scaling() -> None:
         steps = result.counters["steps"]
         print(f"| {count} | {steps} | {seconds:.2f} | {1e6 * seconds / steps / count:.1f} |")
     largest_count, duration = pick(100, 4), pick(60.0, 1.0)
-    for threads in (1, 2):
-        result, seconds, clock = timed(tower(largest_count, duration), threads)
+    for storeys, threads in ((3, 1), (3, 2), (5, 1), (5, 2)):
+        result, seconds, clock = timed(tower(largest_count, duration, storeys=storeys), threads)
         largest = np.abs(result.bearing_displacement[:, :, :2]).max()
         print(
-            f"{largest_count} bearings, {duration:g} s, threads {threads}: {result.counters['steps']} steps, {seconds:.1f} s of the processors, "
+            f"{largest_count} bearings, {storeys} storeys, {duration:g} s, threads {threads}: {result.counters['steps']} steps, {seconds:.1f} s of the processors, "
             f"{clock:.1f} s of the clock; bearings {1e3 * largest:.0f} mm"
         )
 
