@@ -70,9 +70,9 @@ int msfp_all_finite(const double *values, size_t count)
     return sum == 0.0;
 }
 
-static int finite(const void *numbers, size_t size) { return msfp_all_finite(numbers, size / sizeof(double)); }
+static int only_finite(const void *numbers, size_t size) { return msfp_all_finite(numbers, size / sizeof(double)); }
 
-#define FINITE(field) finite(&(field), sizeof(field))
+#define FINITE(field) only_finite(&(field), sizeof(field))
 
 static int in_range(long value, long least, long most) { return value >= least && value <= most; }
 
