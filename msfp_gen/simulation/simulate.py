@@ -173,8 +173,11 @@ def simulate(
     if checkpoint is not None and not resume:
         require_no_checkpoint(checkpoint)
     if isinstance(scene, BuildingScene):
-        own = {"strict": strict, "stream": stream, "gradients": gradients, "energy_gradients": energy_gradients}
-        if unknown := [name for name, value in own.items() if value not in (False, None, ())]:
+        given = {
+            "strict": strict, "stream": stream is not None, "gradients": bool(gradients),
+            "energy_gradients": energy_gradients, "gradient_errors": not gradient_errors,
+        }  # fmt: skip
+        if unknown := [name for name, value in given.items() if value]:
             raise InputError(f"{unknown[0]}: the run of a building has no such option; leave it out")
         return simulate_building(scene, progress, checkpoint, every, resume, threads)
     if not isinstance(scene, Scene):

@@ -125,7 +125,13 @@ def test_messages_of_bad_bearings():
             BuildingBearing(BEARING, INTERFACE, effects=effects)
 
 
-@pytest.mark.parametrize("option", [{"strict": True}, {"stream": "run.nc"}, {"gradients": ["motion.scale"]}])
+OPTIONS = {
+    "strict": True, "stream": "run.nc", "gradients": ["motion.scale"], "energy_gradients": True,
+    "gradient_errors": False,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("option", [{name: value} for name, value in OPTIONS.items()], ids=OPTIONS)
 def test_options_of_a_bearing_are_rejected(option):
     with pytest.raises(InputError, match=f"{next(iter(option))}: the run of a building has no such option"):
         simulate(scene(frame()), **option)
