@@ -265,17 +265,17 @@ class RunSequence:
             raise switching_error(segment, notes)
         self.effects = following
 
-    def result(self, with_initial_row: bool = False) -> Result:
-        """The result of all segments; raises RunError where none has a row. A segment that failed at once has none.
+    def result(self) -> Result:
+        """The result of all segments. A segment that failed at once has no row; of a run that did, the initial state.
 
-        with_initial_row: record the initial state of a run that failed before its first row, if that state is finite.
+        Raises RunError where that state is not finite, or would have derivatives.
         """
         last = self.segments[-1]
         if self.stream is not None:
             rows_on_disk = StreamedRows(self.segments, self.given)
             if rows_on_disk.count:
                 return rows_on_disk.written(partial(_result, self), self.stream)
-        if with_initial_row and not any(segment.run.row_count for segment in self.segments):
+        if not self.parameters and not any(segment.run.row_count for segment in self.segments):
             last.run.record_now()
         parts = [(s, rows) for s in self.segments if len(rows := finite_rows(s.run.rows))]
         if not parts:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
@@ -15,12 +16,13 @@ from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.memory import require_memory
-from msfp_gen.simulation.simulate import RunSequence, simulate
+from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.estimation.backbone_run import check_backbone, run_backbone
 from msfp_gen.studies.pool import SharedProgress, local_pool, raise_if_stopped, worker_count
 
 Proceed = Callable[[float, float], None]
 ENDED = ("ok", "stopped")  # statuses of runs that did not fail
+BAD_INPUT, OUT_OF_TIME = "input", "limit"  # statuses that only runs of studies have
 
 
 def simulate_batch(
@@ -145,21 +147,34 @@ def build_models(scenes: Iterable[AnyScene]) -> None:
         build_model(spec.layout, spec.effects)
 
 
-def run_to_end(scene: AnyScene, strict: bool = False, proceed: Proceed = raise_if_stopped, threads: int = 1) -> Any:
-    """The result of `simulate`, also for a run that fails. proceed: called often; its exceptions end the run.
+class _OutOfTime(KeyboardInterrupt):
+    """Ends a run as Ctrl-C does, so that its result has the rows until then."""
 
-    threads: for the bearings of a building; other runs have the other cores. Raises RunError: failed at its start.
+
+def run_to_end(
+    scene: AnyScene, *, progress: Proceed = raise_if_stopped, seconds: float | None = None, **options: Any
+) -> Any:
+    """The result of a run of any scene, also of one that fails: here runs of studies start.
+
+    progress, options: of `simulate`. seconds: wall time of the run at most [s]; None: no limit. Raises InputError as
+    `simulate`; RunError: there are no rows, or the time is over (status "limit"; `.result` has the rows until then).
     """
     if scene.fidelity == "backbone":
         return run_backbone(scene)
-    if isinstance(scene, Scene):
-        sequence = RunSequence.of(scene, strict)
-        while sequence.effects is not None:
-            sequence.run_segment(proceed)
-        return sequence.result(with_initial_row=True)
+    begin, expired = time.perf_counter(), False
+
+    def proceed(reached: float, end: float) -> None:
+        nonlocal expired
+        progress(reached, end)
+        if seconds is not None and time.perf_counter() - begin > seconds and reached < end:
+            expired = True
+            raise _OutOfTime
+
     try:
-        return simulate(scene, progress=proceed, threads=threads)
+        return simulate(scene, progress=proceed, **options)
     except RunError as error:
+        if expired:
+            raise RunError(f"ended after {seconds:g} s of wall time", status=OUT_OF_TIME, result=error.result) from None
         if error.result is None:
             raise
         return error.result
@@ -177,9 +192,12 @@ def _located(label: str) -> Iterator[None]:
 
 
 def _run(label: str, scene: AnyScene, strict: bool, proceed: Proceed | None, threads: int) -> Any:
-    """One run of a batch, in a worker; its RunError if it has no rows."""
+    """One run of a batch, in a worker; a RunError if it has no rows."""
     try:
         with _located(label):
-            return run_to_end(scene, strict, proceed or raise_if_stopped, threads)
+            options = {"strict": strict} if isinstance(scene, Scene) else {"threads": threads}
+            return run_to_end(scene, progress=proceed or raise_if_stopped, **options)
     except RunError as error:
         return error
+    except InputError as error:  # such as rows for which other runs leave no memory
+        return RunError(str(error), status=BAD_INPUT)

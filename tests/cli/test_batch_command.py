@@ -168,10 +168,10 @@ def test_a_run_without_rows_is_a_row_of_the_table(
 ) -> None:
     run_to_end = batch.run_to_end
 
-    def second_fails(scene: Scene, *arguments: Any) -> Any:
+    def second_fails(scene: Scene, **options: Any) -> Any:
         if scene.solver.rtol == 2e-3:
             raise RunError("stopped at t = 0 s: jammed", status="newton")
-        return run_to_end(scene, *arguments)
+        return run_to_end(scene, **options)
 
     monkeypatch.setattr(batch, "run_to_end", second_fails)
     words = ["batch", "fenz-test1", "--vary", "solver.rtol=1e-3,2e-3,3e-3", "-o", str(tmp_path / "runs")]

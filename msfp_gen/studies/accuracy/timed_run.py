@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, cast
@@ -14,6 +13,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.results.history import Counters
 from msfp_gen.simulation.simulate import simulate
+from msfp_gen.studies.batch import OUT_OF_TIME, run_to_end
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
@@ -212,21 +212,6 @@ def refused_trial(method: str, rtol: float, scene: Scene, why: str) -> Trial:
     return Trial(method, rtol, REFUSED, 0.0, 0.0, scene.end, 0, 0, 0, *empty, message=why)
 
 
-class _OutOfTime(KeyboardInterrupt):
-    """Ends a run as Ctrl-C does, so that `simulate` returns what was computed until then."""
-
-
-def time_limit(limit: float) -> Callable[[float, float], None]:
-    """A progress callback for `simulate` that ends the run after `limit` seconds of wall time."""
-    begin = time.perf_counter()
-
-    def check(reached: float, end: float) -> None:
-        if time.perf_counter() - begin > limit and reached < end:
-            raise _OutOfTime
-
-    return check
-
-
 def require_base_motion_only(scene: Scene) -> None:
     """Raise InputError for a scene with a load or a rotation of the top, which this method would ignore."""
     for name in ("load", "top_rotation"):
@@ -255,18 +240,15 @@ def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int 
 
 def _run_limited(scene: Scene, limit: float) -> tuple[Result | None, str, str]:
     """The result as far as it was computed, its status, and the message of a failure."""
-    from msfp_gen.result import Result
-
-    started = time.perf_counter()
     try:
-        return simulate(scene, progress=time_limit(limit)), OK, ""
+        result = run_to_end(scene, seconds=limit)
     except RunError as error:
-        result = error.result if isinstance(error.result, Result) else None
-        if error.status != "interrupted":
-            return result, error.status or "failed", str(error)
-        if time.perf_counter() - started < limit:
-            raise  # interrupted by the user
-        return result, CUT_OFF, f"cut off after {limit:g} s"
+        if error.status == OUT_OF_TIME:
+            return error.result, CUT_OFF, f"cut off after {limit:g} s"  # type: ignore[return-value]
+        return None, error.status or "failed", str(error)
+    if result.status == "interrupted":  # by the user
+        raise RunError(result.message, status=result.status, result=result)
+    return result, OK if result.succeeded else result.status, result.message
 
 
 def _trial(

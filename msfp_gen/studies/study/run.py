@@ -13,8 +13,8 @@ from msfp_gen.common.inputs import Files, expecting
 from msfp_gen.common.output import make_folder, write_bytes
 from msfp_gen.common.tables import parquet_bytes
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.studies.batch import ENDED, build_models, check_method, run_to_end
-from msfp_gen.studies.pool import Pool, pool_from, raise_if_stopped
+from msfp_gen.studies.batch import BAD_INPUT, ENDED, OUT_OF_TIME, build_models, check_method, run_to_end
+from msfp_gen.studies.pool import Pool, pool_from
 from msfp_gen.studies.study.axes import INTENSITY, Recipe, SceneFactory
 from msfp_gen.studies.study.chunks import Chunks, chunks_in, failures, parts_in
 from msfp_gen.studies.study.definition import Study, Task
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from msfp_gen.buildings.file import AnyScene
 
 Progress = Callable[[int, int], None]
-BAD_SCENE, OUT_OF_TIME = "input", "limit"  # statuses of a study, beside those of a run
 
 
 class Outcome(NamedTuple):
@@ -179,10 +178,6 @@ class Order(NamedTuple):
     timed: bool = False
 
 
-class _OutOfTimeError(Exception):
-    """Ends a run at the limit of its wall time."""
-
-
 _factories: dict[str, SceneFactory] = {}  # of the last study only
 
 
@@ -220,28 +215,14 @@ def _row(make: Callable[[], AnyScene], order: Order, at: dict[str, float]) -> tu
     try:
         scene = make()
         check_method(scene)
+        result = run_to_end(scene, seconds=order.run_seconds)
     except InputError as error:
-        return BAD_SCENE, str(error), {}
-    try:
-        result = _result(scene, order.run_seconds)
-    except RunError as error:  # failed before its first row
-        return error.status, str(error), {}
-    except _OutOfTimeError:
-        return OUT_OF_TIME, f"ended after {order.run_seconds:g} s of wall time; see limits.run_seconds", {}
+        return BAD_INPUT, str(error), {}
+    except RunError as error:  # without rows, or with those that a slow computer reaches
+        remedy = "; see limits.run_seconds" if error.status == OUT_OF_TIME else ""
+        return error.status, f"{error}{remedy}", {}
     kept, problem = order.keep.values(result, at)
     return result.status, result.message or problem, kept
-
-
-def _result(scene: AnyScene, seconds: float | None) -> Any:
-    """The result of a run. seconds: of wall time, after which it ends by _OutOfTimeError; None: no limit."""
-    end = None if seconds is None else time.monotonic() + seconds
-
-    def proceed(reached: float, of: float) -> None:
-        raise_if_stopped(reached, of)
-        if end is not None and time.monotonic() > end and reached < of:
-            raise _OutOfTimeError
-
-    return run_to_end(scene, proceed=proceed)
 
 
 def _part(order: Order, rows: list[dict[str, Any]], failed: int, more: dict[str, str]) -> bytes:

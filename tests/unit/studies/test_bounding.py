@@ -258,7 +258,7 @@ def test_figure_overlays_the_three_loops(tmp_path: Path) -> None:
 
 @pytest.fixture
 def upper_fails(monkeypatch: Any) -> None:
-    def run_to_end(scene: Scene, *_: Any) -> Any:
+    def run_to_end(scene: Scene, **_: Any) -> Any:
         run = dataclasses.replace(loops(), scene=scene)
         if scene.name.endswith("upper"):
             return dataclasses.replace(run, status="newton", message="stopped at t = 3 s: jammed")
@@ -290,7 +290,7 @@ def test_a_bound_that_fails_leaves_the_others(upper_fails: None, tmp_path: Path,
 def test_a_bound_that_fails_before_its_first_row_leaves_the_others(
     monkeypatch: Any, upper_fails: None, tmp_path: Path, capsys: Any
 ) -> None:
-    def run_to_end(scene: Scene, *_: Any) -> Any:
+    def run_to_end(scene: Scene, **_: Any) -> Any:
         if scene.name.endswith("upper"):
             raise RunError("stopped at t = 0 s: jammed", status="newton")
         return dataclasses.replace(loops(), scene=scene)
