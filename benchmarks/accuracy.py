@@ -19,6 +19,7 @@ from quick import docs_folder, parser, pick
 
 from msfp_gen import RunError, Scene
 from msfp_gen.common.output import replacing
+from msfp_gen.common.tables import markdown_table
 from msfp_gen.studies.accuracy import model_errors, output, simulate_within, work_precision
 from msfp_gen.studies.accuracy.error_target import largest_error
 from msfp_gen.studies.accuracy.output import machine
@@ -83,11 +84,6 @@ TARGETS = pick((0.02, 0.005, 0.001), (0.02,))
 
 def say(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
-
-
-def markdown_table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    """A Markdown table."""
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (head, ("---",) * len(head), *rows))
 
 
 def seconds(value: float) -> str:

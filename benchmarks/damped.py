@@ -12,11 +12,12 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from accuracy import CASES, TOLERANCES, Case, markdown_table, percent, say
+from accuracy import CASES, TOLERANCES, Case, percent, say
 from drawing import COLOURS, FAINT, drawn
 from quick import docs_folder, parser, pick
 
 from msfp_gen import Scene
+from msfp_gen.common.tables import markdown_table
 from msfp_gen.studies.accuracy import work_precision
 from msfp_gen.studies.accuracy.methods import METHODS
 from msfp_gen.studies.accuracy.study import Point, Study

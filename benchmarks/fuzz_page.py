@@ -13,6 +13,8 @@ from typing import Any
 
 from quick import docs_folder, parser
 
+from msfp_gen.common.tables import markdown_table
+
 RESULTS = Path(__file__).with_name("results")
 MARKS = ("<!-- fuzz -->\n", "<!-- end of fuzz -->\n")
 FALLBACKS = ("other_starts", "halved_newton_steps", "fresh_tangents", "newton_failures", "quasistatic_starts")
@@ -38,15 +40,22 @@ def tables(parts: list[dict[str, Any]]) -> str:
         f"{len(failures)} failed, {100 * len(failures) / max(sensible, 1):.2g} %. {compared} successes were compared with "
         f"the second method; the largest deviation is {worst:.2f} of the permitted one. For {undecided} more the second method found no solution.",
         "",
-        "| status | scenes | sensible |",
-        "|---|---|---|",
-        *(f"| {end} | {number} | {good[end]} |" for end, number in ends.most_common()),
+        markdown_table(
+            ("status", "scenes", "sensible"),
+            ((end, str(number), str(good[end])) for end, number in ends.most_common()),
+        ),
         "",
-        "| fallback | uses | uses per thousand steps | scenes that used it |",
-        "|---|---|---|---|",
-        *(
-            f"| `{fallback}` | {counts[fallback]} | {1000 * counts[fallback] / counts['steps']:.3g} | {100 * used[fallback] / scenes:.1f} % |"
-            for fallback in FALLBACKS
+        markdown_table(
+            ("fallback", "uses", "uses per thousand steps", "scenes that used it"),
+            (
+                (
+                    f"`{name}`",
+                    str(counts[name]),
+                    f"{1000 * counts[name] / counts['steps']:.3g}",
+                    f"{100 * used[name] / scenes:.1f} %",
+                )
+                for name in FALLBACKS
+            ),
         ),
     ]
     return "\n".join(lines) + "\n"

@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from results_page import row, table
+from msfp_gen.common.tables import markdown_table
 
 HEAD = ("compared with", "case", "beyond the tolerance", "largest", "what it comes from", "without it")
 Comparison = dict[str, str]  # a row of results/comparisons.csv
@@ -135,12 +135,12 @@ def causes(comparisons: Sequence[Comparison]) -> str:
     for one in found:
         if sum(belongs(one, cause) for cause in CAUSES) != 1:
             raise ValueError(f"{one['case']}, {one['source']}, {one['quantity']} {one['at']}: not of one cause")
-    lines = []
+    rows = []
     for cause in CAUSES:
         own = [one for one in found if belongs(one, cause)]
         total = sum(belongs(one, cause) for one in comparisons)
         rest = without(comparisons, cause)
         other = f"{len(outside(rest))} of {len(rest)}, largest {largest(rest)}" if rest else "–"
         if own:
-            lines.append(row(cause.source, cause.label, f"{len(own)} of {total}", largest(own), cause.words, other))
-    return table(HEAD, lines)
+            rows.append((cause.source, cause.label, f"{len(own)} of {total}", largest(own), cause.words, other))
+    return markdown_table(HEAD, rows)

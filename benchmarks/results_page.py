@@ -12,6 +12,7 @@ from inertia_study import GRID, RTOL, SERIES, TESTED, Point, failures, scene
 from msfp_gen import simulate
 from msfp_gen.analysis import transitions as stops
 from msfp_gen.common.output import replacing
+from msfp_gen.common.tables import markdown_table
 from msfp_gen.result import Result
 from msfp_gen.results.sliding import SHARE
 
@@ -31,20 +32,12 @@ ORBITS = tuple(f"becker-{kind}-{a}" for kind in ("circle", "eight") for a in (12
 TEMPLATE = Path(__file__).with_name("results.md.in")
 
 
-def row(*cells: str) -> str:
-    return "| " + " | ".join(cells) + " |"
-
-
-def table(head: tuple[str, ...], rows: list[str]) -> str:
-    return "\n".join([row(*head), row(*["---"] * len(head)), *rows])
-
-
-def table_42_row(key: str, ours: float, closed: float | None) -> str:
+def table_42_row(key: str, ours: float, closed: float | None) -> tuple[str, ...]:
     """One row of Table 4.2 with two more columns; `ours` and `closed` are displacements in [m] or F over N."""
     name, *printed = TABLE_42[key]
     scale, digits = (MILLI, 1) if key.startswith("u_") else (1.0, 3)
     numbers = [*(f"{value:.{digits}f}" for value in printed), f"{ours * scale:.{digits}f}"]
-    return row(name, *numbers, "–" if closed is None else f"{closed * scale:.{digits}f}")
+    return (name, *numbers, "–" if closed is None else f"{closed * scale:.{digits}f}")
 
 
 def closed_transitions(result: Result) -> dict[str, float]:
@@ -60,7 +53,7 @@ def closed_transitions(result: Result) -> dict[str, float]:
     return found
 
 
-def stage_rows(result: Result) -> list[str]:
+def stage_rows(result: Result) -> list[tuple[str, ...]]:
     """For each sliding regime its displacements, and the surfaces that slide with their shares of all sliding."""
     history, found = result.history, result.summary["transitions"]
     u = history.displacement[:, 0]
@@ -70,11 +63,11 @@ def stage_rows(result: Result) -> list[str]:
         moved = np.array([abs(np.interp(high, u, s) - np.interp(low, u, s)) for s in history.sliding.T])
         share = moved / moved.sum()
         taking = [f"{index + 1} ({share[index]:.0%})" for index in np.flatnonzero(share > TAKES_PART)]
-        rows.append(row(name, f"{low * MILLI:.1f} – {high * MILLI:.1f}", ", ".join(taking)))
+        rows.append((name, f"{low * MILLI:.1f} – {high * MILLI:.1f}", ", ".join(taking)))
     return rows
 
 
-def peak_row(result: Result, closed: bool) -> str:
+def peak_row(result: Result, closed: bool) -> tuple[str, ...]:
     """Peaks of a run; with `closed` also the closed form at the same displacement, and the change of the last cycle."""
     summary = result.summary
     u = summary["peak_displacement"]["radial"]
@@ -86,7 +79,7 @@ def peak_row(result: Result, closed: bool) -> str:
     ]
     if closed:
         cells += [f"{closed_form(result, np.array([u]))[0]:.4f}", f"{cycle_change(result):.2%}"]
-    return row(*cells, ", ".join(map(str, summary["rims_met"])) or "none")
+    return (*cells, ", ".join(map(str, summary["rims_met"])) or "none")
 
 
 def resting_offset(result: Result) -> float:
@@ -152,19 +145,19 @@ def page(runs: Runs, points: list[Point]) -> str:
     quake = runs("ridgecrest-clc").summary
     peaks = ("scene", "u [mm]", "F [kN]", "F / N")
     return TEMPLATE.read_text(encoding="utf-8").format(
-        table_42=table(
+        table_42=markdown_table(
             ("", "analytical", "experiment", "PEER model", "this project", "closed form"),
             [table_42_row(key, found[key], closed.get(key)) for key in TABLE_42],
         ),
-        stages=table(("regime", "u [mm]", "surfaces that slide (share of all sliding)"), stage_rows(push)),
+        stages=markdown_table(("regime", "u [mm]", "surfaces that slide (share of all sliding)"), stage_rows(push)),
         window=f"{stops.WINDOW * MILLI:g}",
         share=f"{SHARE:.0%}",
         resolution=f"{found['resolution'] * MILLI:.2f}",
-        loops=table(
+        loops=markdown_table(
             (*peaks, "closed form F / N", "cycle 2 against 1", "rims met"),
             [peak_row(runs(name), closed=True) for name in PERIODIC],
         ),
-        orbits=table((*peaks, "rims met"), [peak_row(runs(name), closed=False) for name in ORBITS]),
+        orbits=markdown_table((*peaks, "rims met"), [peak_row(runs(name), closed=False) for name in ORBITS]),
         offset=f"{resting_offset(runs(ORBITS[2])) * MILLI:.1f}",
         quake_u=f"{quake['peak_displacement']['radial'] * MILLI:.1f}",
         quake_f=f"{quake['peak_force_ratio']:.3f}",

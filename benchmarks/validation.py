@@ -27,7 +27,7 @@ import external  # noqa: E402
 import outside  # noqa: E402
 from drawing import MILLI, Array, closed_form  # noqa: E402
 from reference import friction_laws as law_reference  # noqa: E402
-from results_page import TABLE_42, closed_transitions, row, table  # noqa: E402
+from results_page import TABLE_42, closed_transitions  # noqa: E402
 
 from msfp_gen import (  # noqa: E402
     Bearing,
@@ -44,6 +44,7 @@ from msfp_gen import (  # noqa: E402
     simulate,
 )
 from msfp_gen.common.output import replacing  # noqa: E402
+from msfp_gen.common.tables import markdown_table  # noqa: E402
 from msfp_gen.result import Result  # noqa: E402
 from msfp_gen.scene.friction_parameters import coefficient  # noqa: E402
 from msfp_gen.specification.friction_laws import BUILT_IN  # noqa: E402
@@ -256,13 +257,20 @@ def series(opensees: bool = True) -> list[external.Series]:
     return found
 
 
-def series_line(found: external.Series) -> str:
+def series_line(found: external.Series) -> tuple[str, ...]:
     """One row of the table of series."""
     off, limit = np.abs(found.differences), external.TOLERANCE[found.kind]
     rms = float(np.sqrt(np.mean(off**2)))
     inside = f"{found.within} of {len(off)}"
-    return row(
-        found.name, found.source, found.kind, found.quantity, inside, f"{limit:.0%}", f"{off.max():.2%}", f"{rms:.2%}"
+    return (
+        found.name,
+        found.source,
+        found.kind,
+        found.quantity,
+        inside,
+        f"{limit:.0%}",
+        f"{off.max():.2%}",
+        f"{rms:.2%}",
     )
 
 
@@ -300,12 +308,12 @@ def history(text: str) -> list[dict[str, str]]:
     return [*(one for one in rows if one["version"] not in (label(), UNRELEASED)), now]
 
 
-def line(case: Case) -> str:
+def line(case: Case) -> tuple[str, ...]:
     """One row of the table."""
     numbers = [f"{value:.{case.digits}f}" for value in (case.reference, case.ours)]
     share = abs(case.difference)
     difference = f"{case.difference:+.1%}" if share >= 5e-4 else f"{case.difference:+.0e}" if share >= 1e-12 else "0"
-    return row(case.case, case.source, case.kind, case.quantity, *numbers, difference, f"`{case.command}`")
+    return (case.case, case.source, case.kind, case.quantity, *numbers, difference, f"`{case.command}`")
 
 
 def versions() -> str:
@@ -318,11 +326,11 @@ def page(rows: list[Case], found: list[external.Series], past: list[dict[str, st
     comparisons = list(csv.DictReader(text.splitlines()))
     filled = TEMPLATE.read_text(encoding="utf-8")
     for name, value in {
-        "table": table(HEAD, [line(case) for case in rows]),
-        "series": table(SERIES_HEAD, [series_line(one) for one in found]),
+        "table": markdown_table(HEAD, map(line, rows)),
+        "series": markdown_table(SERIES_HEAD, map(series_line, found)),
         "outside": "" if QUICK else outside.causes(comparisons),  # steps of a quick run have causes of their own
         "beyond": str(len(outside.outside(comparisons))),
-        "history": table(tuple(past[-1]), [row(*one.values()) for one in past]),
+        "history": markdown_table(tuple(past[-1]), (one.values() for one in past)),
         "count": past[-1]["comparisons"],
         "within": past[-1]["within"],
         "programs": versions(),

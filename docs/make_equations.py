@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from msfp_gen.common.output import replacing
+from msfp_gen.common.tables import markdown_table
 from msfp_gen.generator.assembled import assembled_latex
 from msfp_gen.generator.derive import derive
 from msfp_gen.generator.latex import statements
@@ -179,14 +180,14 @@ def place(text: str) -> str:
 
 def schedule_table(passes: Iterable[Pass]) -> str:
     """The calls of passes as a table."""
-    lines = ["| over | program | reads | writes |", "|---|---|---|---|"]
+    rows = []
     for one in passes:
         for call in one.calls:
             reads, writes = (", ".join(map(place, places)) for places in (call.reads, call.writes))
             program = " or ".join(f"`{name}`" for name in call.programs)
             program += ", where it acts" if isinstance(call.by, Decision) else ""
-            lines.append(f"| {OVER[one.over]} | {program} | {reads} | {writes} |")
-    return "\n".join(lines)
+            rows.append((OVER[one.over], program, reads, writes))
+    return markdown_table(("over", "program", "reads", "writes"), rows)
 
 
 def schedule_section() -> list[str]:

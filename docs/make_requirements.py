@@ -20,6 +20,7 @@ import typer.main
 
 from msfp_gen.cli import app
 from msfp_gen.common.fields import Choice
+from msfp_gen.common.tables import markdown_table
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import Effects
 
@@ -328,11 +329,8 @@ def page() -> str:
         rows = requirements()[title]
         measured = any(row.figure for row in rows)
         names = (head, "tests", *(["last measured"] if measured else []))
-        lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
-        for row in rows:
-            cells = (row.name, cell(row.tests), *([row.figure or "–"] if measured else []))
-            lines.append("| " + " | ".join(cells) + " |")
-        parts.append(f"## {title}\n\n" + "\n".join(lines) + "\n")
+        cells = [(row.name, cell(row.tests), *([row.figure or "–"] if measured else [])) for row in rows]
+        parts.append(f"## {title}\n\n{markdown_table(names, cells)}\n")
     return "\n".join(parts)
 
 

@@ -14,6 +14,7 @@ from msfp_gen.buildings import file as buildings
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
 from msfp_gen.buildings.storey import BaseSlab, Soil, Storey
 from msfp_gen.common.fields import Choice, Quantity, Rule, ruled_fields
+from msfp_gen.common.tables import markdown_table
 from msfp_gen.motions.records import ScaleTo
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.file import motion_tables, schema
@@ -334,7 +335,7 @@ def default_of(given: Any) -> str:
 def section(title: str, path: str, kind: type) -> str:
     """One table of the page: the keys in the order of the schema, those that are required first."""
     rules = {name: (rule, default) for name, rule, default in ruled_fields(kind)}
-    lines = [f"## {title}", "", "| key | takes | default | meaning |", "|---|---|---|---|"]
+    rows = []
     tables = TABLES["building" if kind is BuildingScene or path.startswith("building") else "bearing"]
     path = path or ("" if kind is Scene else "building_scene")
     fields = tables["" if path == "building_scene" else path].model_fields
@@ -343,8 +344,8 @@ def section(title: str, path: str, kind: type) -> str:
         shown = f'`"{kind.kind}"`' if key == "kind" else takes(rule)  # type: ignore[attr-defined]
         if key == "least_share":
             shown = takes(Quantity("", above=0.0))
-        lines.append(f"| `{key}` | {shown} | {default_of(given)} | {meaning(path, key)} |")
-    return "\n".join(lines)
+        rows.append((f"`{key}`", shown, default_of(given), meaning(path, key)))
+    return f"## {title}\n\n{markdown_table(('key', 'takes', 'default', 'meaning'), rows)}"
 
 
 def page() -> str:

@@ -45,8 +45,7 @@ class Table:
     @property
     def markdown(self) -> str:
         """The rows below the names of the columns, as Markdown; without the title."""
-        lines = (self.columns, ["---"] * len(self.columns), *self.rows)
-        return "".join(" | ".join(("", *cells, "")).strip() + "\n" for cells in lines)
+        return markdown_table(self.columns, self.rows) + "\n"
 
     def rich(self) -> RichTable:
         """The table for a terminal, drawn by the library rich."""
@@ -67,6 +66,16 @@ class Table:
         for row in self.rows:
             table.add_row(*map(Text, row))
         return table
+
+
+def markdown_row(cells: Iterable[str]) -> str:
+    """One line of a table in Markdown."""
+    return f"| {' | '.join(cells)} |"
+
+
+def markdown_table(columns: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table in Markdown, without a line break at its end."""
+    return "\n".join(map(markdown_row, (columns, ["---"] * len(columns), *rows)))
 
 
 def yes(value: object) -> str:

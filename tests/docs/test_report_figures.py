@@ -53,16 +53,15 @@ def test_a_cycle_is_one_period_and_closes():
 
 
 def test_row_of_table_42_is_in_millimetres_or_over_the_load():
-    assert results_page.table_42_row("u_dr1", 0.0865, 0.0859) == ("| u_dr1 [mm] | 92.1 | 90.0 | 87.0 | 86.5 | 85.9 |")
-    assert results_page.table_42_row("F_dr4", 0.26458, 0.26298) == (
-        "| F_dr4 / N | 0.240 | 0.272 | 0.275 | 0.265 | 0.263 |"
-    )
-    assert results_page.table_42_row("u_star", 0.00172, None).endswith("| 1.7 | – |")
+    row = results_page.table_42_row
+    assert row("u_dr1", 0.0865, 0.0859) == ("u_dr1 [mm]", "92.1", "90.0", "87.0", "86.5", "85.9")
+    assert row("F_dr4", 0.26458, 0.26298) == ("F_dr4 / N", "0.240", "0.272", "0.275", "0.265", "0.263")
+    assert row("u_star", 0.00172, None)[-2:] == ("1.7", "–")
 
 
 def test_stages_slide_where_section_41_says():
-    stages = [line.split(" | ")[2] for line in results_page.stage_rows(run("fenz-monotonic"))]
-    main = [sorted(part.split()[0] for part in cell.strip(" |").split(", ") if int(part[3:-2]) > 10) for cell in stages]
+    stages = [sliding for *_, sliding in results_page.stage_rows(run("fenz-monotonic"))]
+    main = [sorted(part.split()[0] for part in cell.split(", ") if int(part[3:-2]) > 10) for cell in stages]
     assert main[1:] == [["1", "3"], ["1", "4"], ["2", "4"], ["2", "3"]]
     assert {"2", "3"} <= set(main[0])
 

@@ -19,7 +19,7 @@ def rows(title: str) -> list[list[str]]:
     """Cells of the rows of a section of the page."""
     page = (ROOT / "docs" / "requirements.md").read_text(encoding="utf-8")
     table = page.split(f"## {title}\n", 1)[1].split("\n## ", 1)[0]
-    lines = [line for line in table.splitlines() if line.startswith("| ")][1:]
+    lines = [line for line in table.splitlines() if line.startswith("| ")][2:]
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
 
 
