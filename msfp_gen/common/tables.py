@@ -115,14 +115,15 @@ def _csv(columns: Mapping[tuple[str, str], Sequence[Any]]) -> bytes:
 
 
 def parquet_bytes(
-    columns: Mapping[tuple[str, str], Sequence[Any]],
+    columns: Mapping[tuple[str, str], Any],
     types: Mapping[str, str] | None = None,
     about: Mapping[str, str] | None = None,
+    meanings: Mapping[str, str] | None = None,
 ) -> bytes:
     """The content of a Parquet file, with checksums of its pages.
 
     columns: as of `write_columns`. types: name -> type in the words of Arrow; None: from the values. about: metadata of
-    the file.
+    the file. meanings: name -> text, as metadata "long_name" of the column.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -132,7 +133,7 @@ def parquet_bytes(
         for (name, _), values in columns.items()
     ]
     fields = [
-        pa.field(name, array.type, metadata={"units": unit})
+        pa.field(name, array.type, metadata={"units": unit} | ({"long_name": meanings[name]} if meanings else {}))
         for (name, unit), array in zip(columns, arrays, strict=True)
     ]
     content = BytesIO()

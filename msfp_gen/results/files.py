@@ -22,6 +22,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output, replacing, write_bytes
+from msfp_gen.common.tables import parquet_bytes
 from msfp_gen.errors import InputError
 from msfp_gen.results.note import Note
 from msfp_gen.results.sign import DEFAULT, VARIABLES, sign_of
@@ -168,19 +169,14 @@ class ResultFiles(ABC):
 
         columns, sign: as of `export_columns`. Raises InputError as `to_csv` does.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         target = check_output(path, (".parquet",))
         dataset = signed(self.dataset, sign)
         table = selected_columns(table_of(dataset), columns)
         about = {str(key): str(value) for key, value in dataset.attrs.items()}
         about |= {"sign": _sign_text(sign), "events": json.dumps(_events(dataset))}
-        fields = [pa.field(c.name, pa.float64(), metadata={"units": c.unit, "long_name": c.meaning}) for c in table]
-        content = BytesIO()
-        arrays = [np.ascontiguousarray(c.values) for c in table]
-        pq.write_table(pa.table(arrays, schema=pa.schema(fields, metadata=about)), content)
-        write_bytes(target, [content.getbuffer()])
+        arrays = {(column.name, column.unit): np.ascontiguousarray(column.values) for column in table}
+        meanings = {column.name: column.meaning for column in table}
+        write_bytes(target, [parquet_bytes(arrays, dict.fromkeys(meanings, "double"), about, meanings)])
         return target
 
     def to_mat(self, path: str | Path) -> Path:
