@@ -28,7 +28,7 @@ Rows = list[tuple[str, str]]  # label and value
 
 
 class Curve(NamedTuple):
-    """A curve in few lines of HTML: points x, y, ndarrays, shape (k,), and what they are."""
+    """A curve in few lines of HTML: points x, y, ndarrays, shape (k,), [unit of the caption], and what they are."""
 
     x: Array
     y: Array

@@ -108,7 +108,7 @@ class Building:
 
     @cached_property
     def rigid_motions(self) -> Array:
-        """Coordinates of the six rigid motions of the whole about the origin: ndarray, shape (n, 6)."""
+        """Coordinates of the six rigid motions of the whole about the origin: ndarray, shape (n, 6), [SI]."""
         return rigid_motions(self.nodes, self._static(self.fixed), self.boundary)
 
     def uniform_acceleration(self, acceleration: ArrayLike) -> Array:
@@ -213,7 +213,7 @@ class FixedBase(NamedTuple):
 
     @property
     def relative(self) -> Array:
-        """Motion of the inner coordinates relative to the static response: rows, shape (inner, n)."""
+        """Motion of the inner coordinates relative to the static response: rows, shape (inner, n), [SI]."""
         rows = np.zeros((len(self.inner), len(self.inner) + len(self.boundary)))
         rows[:, self.inner] = np.eye(len(self.inner))
         rows[:, self.boundary] = -self.follow
@@ -278,7 +278,7 @@ Matrix = ArrayLike | str | PathLike[str]
 
 
 def matrix_of(source: Matrix, name: str) -> Array:
-    """A square symmetric matrix, ndarray, shape (n, n).
+    """A square symmetric matrix, ndarray, shape (n, n), [SI].
 
     source: an array, or a file of Matrix Market (.mtx) or of NumPy (.npz, the array `name`).
 
@@ -348,7 +348,7 @@ def boundary_of(nodes: tuple[Node, ...]) -> tuple[int, ...]:
 
 
 def rigid_motions(nodes: tuple[Node, ...], follow: Array, boundary: tuple[int, ...]) -> Array:
-    """Coordinates of the six rigid motions of the building, shape (n, 6).
+    """Coordinates of the six rigid motions of the building, shape (n, 6), [SI].
 
     follow: static response of all coordinates to those of the boundary, shape (n, boundary).
     """

@@ -120,7 +120,7 @@ class Member:
 
     @property
     def entries(self) -> Array:
-        """Indices into the row of its model of the numbers that are kept, shape (kept,); -1: none, it counts as 0."""
+        """Indices into the row of its model of the numbers that are kept, shape (kept,) [-]; -1: none, it is 0."""
         row = [(name, tuple(shape)) for name, shape in self.model.extension.ROW]
         size = sum(int(np.prod(shape, dtype=int)) for _, shape in row)
         indices = parts(np.arange(size), row)
@@ -169,10 +169,10 @@ class Run(AnyRun, Protocol):
 
     @property
     def peaks(self) -> Array:
-        """Peaks over all steps, one number after the other, shape (peaks,)."""
+        """Peaks over all steps, one number after the other, shape (peaks,) [SI]."""
 
     def ends(self, bearing: int) -> Array:
-        """Motion of the ends of a bearing, from 0, at the present state, shape (2, 3, 6)."""
+        """Motion of the ends of a bearing, from 0, at the present state, shape (2, 3, 6) [SI]."""
 
     def replace(self, bearing: int, port: Port, entries: Array, faces: Sequence[int]) -> None:
         """Continue with another two-port of a bearing in that state."""
@@ -331,7 +331,7 @@ def columns(run: BuildingRun) -> Iterator[tuple[str, tuple[int, ...]]]:
 
 
 def unpacked(run: BuildingRun) -> dict[str, Array]:
-    """The rows until now by name, those of bearings with their index; each of shape (k, ...)."""
+    """The rows until now by name, those of bearings with their index; each of shape (k, ...) [SI]."""
     rows: dict[str, Array] = parts(run.run.rows, columns(run))
     for index in {change.bearing for change in run.changes}:  # the integrals of their models begin anew
         work = rows[f"work {index}"]

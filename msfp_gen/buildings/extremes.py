@@ -172,8 +172,8 @@ class BuildingExtremes:
 def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:
     """The vectors of a building of which the compiled run keeps peaks, in the order of `BuildingExtremes.of_run`.
 
-    The order of the derivative of the coordinates that each is of; its rows, shape (vectors, 3, n); the shares of the
-    motions of the ground that are taken off it, shape (vectors, grounds).
+    The order of the derivative of the coordinates that each is of; its rows, shape (vectors, 3, n) [SI]; the shares of
+    the motions of the ground that are taken off it, shape (vectors, grounds) [-].
     """
     building, size = scene.building, len(scene.building.mass)
     grounds, ground_of = scene.grounds
@@ -201,8 +201,8 @@ def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:
 def overturning(scene: BuildingScene) -> Array:
     """Moment that accelerates the building, about E1 and E2 through its centre of mass in plan, at height 0.
 
-    Rows of the accelerations, shape (2, n). The bearings provide it, by horizontal forces at their height and by axial
-    forces beyond those at rest.
+    Rows of the accelerations, shape (2, n) [SI]. The bearings provide it, by horizontal forces at their height and by
+    axial forces beyond those at rest.
     """
     force = (scene.building.mass @ scene.building.rigid_motions).T
     x, y = scene.mass_centre
@@ -210,7 +210,7 @@ def overturning(scene: BuildingScene) -> Array:
 
 
 def corners(scene: BuildingScene) -> Array:
-    """Drift of each storey at the corners of the rectangle around the bearings: rows, shape (storeys, 4, 3, n)."""
+    """Drift of each storey at the corners of the rectangle around the bearings: rows, shape (storeys, 4, 3, n) [SI]."""
     nodes, size = scene.building.nodes, len(scene.building.mass)
     (west, south), (east, north) = scene.places.min(axis=0), scene.places.max(axis=0)
     rows = [
@@ -242,9 +242,9 @@ def heated(bearing: Bearing, temperature: Array) -> Array | None:
 
 
 def padded(columns: Sequence[Array], fill: float = 0.0) -> Array:
-    """Values of the surfaces of all bearings, each of shape (..., surfaces): shape (..., bearings, most surfaces).
+    """Values of the surfaces of all bearings, shape (..., surfaces) each: (..., bearings, most surfaces).
 
-    fill: where a bearing has no such surface.
+    In the [unit of `columns`]. fill: where a bearing has no such surface.
     """
     most = max(values.shape[-1] for values in columns)
     table = np.full((*columns[0].shape[:-1], len(columns), most), fill)

@@ -13,7 +13,7 @@ _HEADER = "%%MatrixMarket matrix coordinate|array real|integer general|symmetric
 
 
 def read_matrix(text: str, most: int) -> Array:
-    """The matrix of a file, real, general or symmetric, dense or as coordinates: ndarray, shape (rows, columns).
+    """The matrix of a file, real, general or symmetric, dense or as coordinates: ndarray, shape (rows, columns), [SI].
 
     most: largest number of rows and of columns. Raises ValueError of one line.
     """

@@ -186,12 +186,12 @@ class BuildingScene:
 
     @cached_property
     def attachments(self) -> Array:
-        """Motion of the upper ends of the bearings: rows, shape (bearings, 6, n)."""
+        """Motion of the upper ends of the bearings: rows, shape (bearings, 6, n) [SI]."""
         return np.stack([self._attachment(index) for index in range(len(self.bearings))])
 
     @cached_property
     def weights(self) -> Array:
-        """Forces of gravity on the coordinates of the building, shape (n,)."""
+        """Forces of gravity on the coordinates of the building, shape (n,) [SI]."""
         return self.building.uniform_acceleration([0.0, 0.0, -self.gravity])
 
     @cached_property
@@ -387,7 +387,7 @@ def _ground(scene: BuildingScene, bearing: BuildingBearing) -> Motion:
 
 
 def remaining_loads(scene: BuildingScene) -> Array:
-    """An estimate of the least axial load of every bearing over that at rest, ndarray, shape (bearings,).
+    """An estimate of the least axial load of every bearing over that at rest, ndarray, shape (bearings,), [-].
 
     The ground moves as below the first bearing. Vertically the response of the linear building on the springs of its
     interfaces; beyond that it overturns as a rigid body under the horizontal force of its bearings where all surfaces

@@ -110,7 +110,7 @@ class Storey:
 
     @property
     def springs(self) -> Array:
-        """Stiffnesses of the columns along and about E1, E2, E3, shape (6,); 0 where they are rigid."""
+        """Stiffnesses of the columns along [N/m] and about [N m] E1, E2, E3, shape (6,); 0 where they are rigid."""
         k1, k2 = self.stiffness  # type: ignore[misc]  # a pair after the check
         r1, r2 = self.rocking_stiffness or (0.0, 0.0)  # type: ignore[misc]
         return np.array([k1, k2, self.vertical_stiffness or 0.0, r1, r2, self.torsional_stiffness])
@@ -119,8 +119,8 @@ class Storey:
 class Columns(NamedTuple):
     """What is stated of the columns of a storey, at half height at their stiffness centre.
 
-    deformation: rows, shape (6, n): motion of the floor above relative to that below, both extended rigidly. inertia:
-    rows, shape (6, n): force and moment that accelerate all floors above, from the accelerations.
+    deformation: rows, shape (6, n) [SI]: motion of the floor above relative to that below, both extended rigidly.
+    inertia: rows, shape (6, n) [SI]: force and moment that accelerate all floors above, from the accelerations.
     """
 
     name: str
@@ -129,7 +129,7 @@ class Columns(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """Matrices of an undamped frame, shape (n, n), SI, its floors from the base upwards, and its columns."""
+    """Matrices of an undamped frame, shape (n, n) [SI], its floors from the base upwards, and its columns."""
 
     mass: Array
     stiffness: Array

@@ -57,7 +57,7 @@ def cos(x: ArrayLike) -> Array:
 
 
 def exp(x: ArrayLike) -> Array:
-    """Exponential, of the shape of `x`; 0 below -708, the least number that is not subnormal."""
+    """Exponential, of the shape of `x`, [-]; 0 below -708, the least number that is not subnormal."""
     values = np.asarray(x, dtype=float)
     n = np.rint(np.clip(values, -2000.0, 2000.0) * 1.4426950408889634)
     r = (values - n * 0.6931471803691238) - n * 1.9082149292705877e-10

@@ -40,7 +40,7 @@ class Action(IntEnum):
 
 
 def freedoms(count: int, up: str) -> Array:
-    """The twelve motions of the ends from `count` degrees of freedom of a client, shape (12, count).
+    """The twelve motions of the ends from `count` degrees of freedom of a client, shape (12, count) [-].
 
     count: 12, two nodes in space (three displacements and three rotations each), or 6, two nodes in the plane X-Y (two
     displacements and a rotation each). up: vertical axis of the client in space, "Y" or "Z". Raises InputError.
@@ -97,7 +97,7 @@ class ServedBearing:
         self._pending = False  # a trial is given and not yet integrated
 
     def answer(self, message: Array) -> Array | None:
-        """The numbers that answer a message, shape (k,); None where the client expects no answer."""
+        """The numbers that answer a message, shape (k,) [SI]; None where the client expects no answer."""
         action = Action(int(message[0]))
         if action is Action.SET_TRIAL:
             self._set_trial(message[1:])

@@ -78,12 +78,12 @@ class Response:
 
     @cached_property
     def damping(self) -> Array:
-        """Derivatives of `wrench` with respect to the rates of both ends, shape (12, 12), as `tangent`."""
+        """Derivatives of `wrench` with respect to the rates of both ends, shape (12, 12) [SI], as `tangent`."""
         return self._port.derivative(self._number, "damping", (0.0, 1.0, 0.0))
 
     @cached_property
     def inertia(self) -> Array:
-        """Derivatives of `wrench` with respect to the accelerations of both ends, shape (12, 12), as `tangent`."""
+        """Derivatives of `wrench` with respect to the accelerations of both ends, shape (12, 12) [SI], as `tangent`."""
         return self._port.derivative(self._number, "inertia", (0.0, 0.0, 1.0))
 
     def effective_stiffness(self, rate: float, acceleration: float) -> Array:
@@ -247,7 +247,7 @@ class TwoPort:
         return self.model.unpack(row)
 
     def derivative(self, number: int, word: str, direction: tuple[float, float, float]) -> Array:
-        """Derivatives of the wrenches of trial `number`, shape (12, 12), for its `Response`; word: their name there."""
+        """Derivatives of the wrenches of trial `number`, shape (12, 12) [SI], for its `Response`; word: their name."""
         if number != self._number or self._trial is None:
             raise InputError(f"{word}: this trial is not the latest; read it before the next trial, commit or revert")
         if self._trial[0] == self.time:

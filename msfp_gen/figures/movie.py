@@ -206,7 +206,7 @@ def even(height: float) -> float:
 
 
 def pictures(figure: Figure, film: Film, progress: Callable[[float, float], None] | None) -> Iterator[Array]:
-    """The frames as pixels, shape (height, width, 4): what stands still is drawn once, the rest over a copy of it."""
+    """The frames as pixels, shape (height, width, 4) [-]: what stands still is drawn once, the rest over a copy."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     figure.set_dpi(DOTS)

@@ -23,7 +23,10 @@ class Stack(Protocol):
     def accelerations(
         self, q: Array, v: Array, f: Array, base: Array, load: Array, *, report: bool = False, **state: Array
     ) -> tuple[str, Array, Array, Array, float, int, int, Array | None]:
-        """Status, accelerations, row, friction rates, residual, iterations, sign of the determinant, unknowns, (u,)."""
+        """Status, accelerations, row, friction rates, residual, iterations, sign of the determinant, unknowns, (u,).
+
+        All [SI]; the friction rates are those of Y and Z [1/s].
+        """
 
     def observe(
         self, q: Array, v: Array, a: Array, f: Array, base: Array, load: Array, **state: Array
@@ -44,7 +47,7 @@ class Stack(Protocol):
         beta: float,
         **state: Array,
     ) -> tuple[str, Array, Array, Array]:
-        """Status, residual, shape (b c,), tangent, (b c, b c), and Y, Z, (b, 2), of the condensed equations."""
+        """Status, residual, shape (b c,), tangent, (b c, b c) [SI], Y, Z, (b, 2) [-], of the condensed equations."""
 
     def report(
         self,
@@ -58,7 +61,7 @@ class Stack(Protocol):
     ) -> tuple[Array, Array, Array]:
         """Residual of the balances (3.26)-(3.29), (u,), its Jacobian, (u, k), and that of the friction rates, (2 b, k).
 
-        k: number of variables, u where none is given.
+        k: number of variables, u where none is given. All [SI].
         """
 
     def vectors(self, q: Array, v: Array, a: Array, base: Array) -> tuple[Array, Array, Array]:
@@ -82,7 +85,7 @@ class AnyRun(Protocol):
 
     @property
     def rows(self) -> Array:
-        """Rows held, shape (T, row size)."""
+        """Rows held, shape (T, row size) [SI]."""
 
     def restore(self, snapshot: bytes) -> None:
         """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
@@ -101,7 +104,7 @@ class Run(AnyRun, Protocol):
 
     @property
     def extremes(self) -> Array:
-        """Extremes over all accepted steps, one number after the other, shape (extremes size,)."""
+        """Extremes over all accepted steps, one number after the other, shape (extremes size,) [SI]."""
 
     @property
     def dropped_rows(self) -> int:
@@ -127,13 +130,13 @@ class Run(AnyRun, Protocol):
         """Begin derivatives with respect to parameters; of everything that the run is given (the wrapper names it)."""
 
     def gradient_rows(self, count: int) -> Array:
-        """Derivatives of `rows` with respect to `count` parameters, shape (T, count, row size)."""
+        """Derivatives of `rows` with respect to `count` parameters, shape (T, count, row size) [SI]."""
 
     def gradient_events(self, count: int) -> Array:
-        """Derivatives of time, displacement and top force of the events, shape (events, count, 7)."""
+        """Derivatives of time, displacement and top force of the events, shape (events, count, 7) [SI]."""
 
     def gradient_extremes(self, count: int) -> Array:
-        """Derivatives of `extremes`, shape (count, size)."""
+        """Derivatives of `extremes`, shape (count, size) [SI]."""
 
 
 class Port(Protocol):
@@ -153,11 +156,11 @@ class Port(Protocol):
 
     @property
     def wrench(self) -> Array:
-        """Wrenches of the ends on the bearing, shape (2, 6), of the last trial or else of the committed state."""
+        """Wrenches of the ends on the bearing, shape (2, 6) [N, N m], of the last trial or of the committed state."""
 
     @property
     def row(self) -> Array:
-        """The row of that state, shape (row size,)."""
+        """The row of that state, shape (row size,) [SI]."""
 
     @property
     def counts(self) -> dict[str, int]:
@@ -195,10 +198,10 @@ class Port(Protocol):
         """Begin a step by stages; status. The next methods: see `port_stage` and others of `msfp.h`."""
 
     def stage(self, stage: int, ends: Array) -> tuple[str, Array]:
-        """Status, and wrenches in a stage with the ends at `ends`, shapes (2, 6) and (2, 3, 6)."""
+        """Status, and wrenches in a stage with the ends at `ends`, shapes (2, 6) [N, N m] and (2, 3, 6) [SI]."""
 
     def stage_derivative(self) -> tuple[str, Array]:
-        """Status, and derivatives of the wrench of the upper end in the stage with respect to its rates, (6, 6)."""
+        """Status, and derivatives of the wrench of the upper end in the stage by its rates, shape (6, 6) [SI]."""
 
     def step_end(self) -> tuple[str, float, float]:
         """Status, error of the step over its tolerance, share of the step at which the first event lies."""

@@ -64,7 +64,7 @@ def input_columns() -> list[Column]:
 
 
 def vector(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Array:
-    """`value` as a finite, contiguous float64 array of the given shape, or an InputError that names it."""
+    """`value` as a finite, contiguous float64 array of the given shape, [its unit], or an InputError that names it."""
     try:
         array = np.ascontiguousarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -77,7 +77,7 @@ def vector(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Ar
 
 
 def bodies_and_surfaces(bearing: Bearing, effects: Effects, top: Top | None = None) -> tuple[Array, Array]:
-    """Arrays of bodies, shape (n, values of a body), and surfaces, (n-1, values of a surface), in contract order.
+    """Arrays of bodies, shape (n, values of a body), and surfaces, (n-1, values of a surface) [SI], in contract order.
 
     top: on which the stiffness of unilateral contacts depends where it is not given. Raises InputError as it does.
     """
@@ -162,7 +162,7 @@ class Evaluation:
 
     @property
     def unknowns(self) -> Array:
-        """The unknowns in the order of (2.119): accelerations, contact positions, normal forces; shape (6(n-1),).
+        """The unknowns in the order of (2.119): accelerations, contact positions, normal forces; shape (6(n-1),) [SI].
 
         Raises InputError for a massless model.
         """

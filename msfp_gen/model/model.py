@@ -164,7 +164,7 @@ class Model:
         )
 
     def unpack(self, rows: Array) -> dict[str, Array]:
-        """Recorded rows, shape (..., row size), as arrays by name; `ROW` of the extension has names and shapes."""
+        """Recorded rows, shape (..., row size) [SI], as arrays by name; `ROW` of the extension has names and shapes."""
         return parts(rows, self.extension.ROW)
 
     def residual(

@@ -97,23 +97,23 @@ class Ode:
         return a, row, rates, iterations
 
     def fun(self, t: float, y: Array) -> Array:
-        """State derivative, ndarray, shape (8(n-1),). Raises RunError where no acceleration is found."""
+        """State derivative, ndarray, shape (8(n-1),), [rad/s, rad/s^2, 1/s]. Raises RunError: no acceleration."""
         return self.rates(t, y)[0]
 
     def rates(self, t: float, y: Array) -> tuple[Array, int]:
-        """The value of `fun`, shape (8(n-1),), and the number of Newton iterations."""
+        """The value of `fun`, shape (8(n-1),) [rad/s, rad/s^2, 1/s], and the number of Newton iterations."""
         a, _, rates, iterations = self._accelerations(t, y)
         return np.concatenate([self._split(np.asarray(y))[1].ravel(), a.ravel(), rates.ravel()]), iterations
 
     def observe(self, t: float, y: Array) -> dict[str, Array]:
-        """The row that a run would record of this state, as arrays by name; shapes of `History` less time.
+        """The row that a run would record of this state, as arrays by name; shapes and units of `History` less time.
 
         Raises RunError as `fun` does.
         """
         return self.model.unpack(self._accelerations(t, y)[1])
 
     def jac(self, t: float, y: Array) -> Array:
-        """Jacobian d fun/d y, ndarray, shape (8(n-1), 8(n-1)). Raises RunError as `fun` does."""
+        """Jacobian d fun/d y, ndarray, shape (8(n-1), 8(n-1)), [SI]. Raises RunError as `fun` does."""
         q, v, h = self._split(np.asarray(y))
         base = self._base(t)
         a, row, *_ = self._accelerations(t, y)

@@ -72,7 +72,7 @@ def motion_in_plane(motion: Motion, azimuth: float) -> Motion:
 
 
 def wrench_in_plane(wrench: Array, azimuth: float) -> Array:
-    """Polynomials of force and moment, shape (k, 6, 6), in the frame of a vertical plane."""
+    """Polynomials of force and moment, shape (k, 6, 6) [SI], in the frame of a vertical plane."""
     rows = wrench.transpose(0, 2, 1)
     return np.ascontiguousarray(
         np.concatenate([rotated(rows[..., :3], azimuth), rotated(rows[..., 3:], azimuth)], axis=-1).transpose(0, 2, 1)
@@ -80,7 +80,7 @@ def wrench_in_plane(wrench: Array, azimuth: float) -> Array:
 
 
 def tilt_pieces(angles: Array, azimuth: float) -> Array:
-    """Polynomials of psi, theta and further angles, shape (k, c, 6), of tilts in the E1-E3 or E2-E3 plane as theta.
+    """Polynomials of psi, theta and further angles, (k, c, 6) [SI], of tilts in the E1-E3 or E2-E3 plane as theta.
 
     Other components are not checked: a planar model uses theta only, and its run ends where the plane is left.
     """
@@ -133,8 +133,8 @@ def rotated_pairs(pairs: Array, angle: float) -> Array:
 def out_of_plane(values: Array, azimuth: float, kind: Kind) -> Array:
     """Results of a planar model in the frame of the user; angles are exact at azimuth 0 and pi/2, else to order tilt^2.
 
-    values: shape (..., 2) or (..., 3), of which `kind` says whether they are Euler angles, contact angles, components
-    along t_1 and t_2, a vector or an axial vector.
+    values: shape (..., 2) or (..., 3), as those returned [unit of `values`]; `kind` says whether they are Euler
+    angles, contact angles, components along t_1 and t_2, a vector or an axial vector.
     """
     if not azimuth:
         return values

@@ -56,7 +56,7 @@ def order(derivative: int) -> int:
 
 
 def vector(field: str, values: ArrayLike, components: int = 3) -> Array:
-    """`values` as an array of finite numbers, shape (components,). Raises InputError."""
+    """`values` as an array of finite numbers, shape (components,), [unit of `values`]. Raises InputError."""
     array = finite(field, values)
     if array.shape != (components,):
         raise InputError(f"{field}: shape {array.shape}; give {components} numbers")
@@ -64,12 +64,12 @@ def vector(field: str, values: ArrayLike, components: int = 3) -> Array:
 
 
 def finite(field: str, values: ArrayLike) -> Array:
-    """`values` as a contiguous array of floats of their shape, (1,) for a number. Raises InputError as `numbers`."""
+    """`values` as contiguous floats, shape (1,) of a number [unit of `values`]. Raises InputError as `numbers`."""
     return np.ascontiguousarray(numbers(field, values))
 
 
 def numbers(field: str, values: ArrayLike) -> Array:
-    """`values` as an array of floats of their shape. Raises InputError unless all are finite numbers."""
+    """`values` as floats, of their shape [unit of `values`]. Raises InputError unless all are finite numbers."""
     try:
         if values is None or np.iscomplexobj(values):
             raise TypeError
@@ -96,7 +96,7 @@ def increasing(field: str, times: Array) -> Array:
 
 
 def samples(field: str, values: ArrayLike, shape: tuple[int, ...] | None = None) -> Array:
-    """`values` as an array of the given shape; shape None: at least four strictly increasing times.
+    """`values` as an array of the given shape [unit of `values`]; shape None: at least four strictly increasing times.
 
     Raises InputError for another shape, other times, or values that are not finite.
     """

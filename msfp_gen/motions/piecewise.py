@@ -41,7 +41,7 @@ _DERIVATIVE_FACTORS = np.array(
 
 
 def powers(values: ArrayLike, count: int = ORDER) -> Array:
-    """Powers 0 to count - 1 along a new last axis, shape (..., count).
+    """Powers 0 to count - 1 along a new last axis, shape (..., count) [powers of the unit of `values`].
 
     By products: the `**` of NumPy depends on the processor.
     """
@@ -135,7 +135,7 @@ def refined(knots: Array, coefficients: Array, new_knots: Array) -> Array:
 
 
 def knot_jumps(knots: Array, coefficients: Array, derivative: int) -> tuple[Array, Array]:
-    """Jumps of a derivative at the inner knots, and their bounds from rounding, both ndarray, shape (k-1, channels).
+    """Jumps of a derivative at the inner knots, and their bounds from rounding, both of shape (k-1, channels) [SI].
 
     The bound is 1e-9 of the largest magnitude of the derivative inside the pieces, plus the cancellation error of the
     values, eps |u| / h**derivative with h of the shorter neighbouring piece. The magnitude is not taken at the knots,

@@ -25,7 +25,7 @@ class Prescribed:
 
     Attributes:
         knots: ndarray, shape (k+1,), [s]: ends of the pieces, increasing from zero.
-        coefficients: ndarray, shape (k, channels, 6): ascending powers of (t - knots[piece]).
+        coefficients: ndarray, shape (k, channels, 6), [SI]: ascending powers of (t - knots[piece]).
         name: a label.
 
     Subclasses define the names of the channels, the word for error messages, and whether a channel may jump.

@@ -41,7 +41,7 @@ class History(Protocol):
 
     @property
     def coefficients(self) -> Array:
-        """Ascending powers of (t - knots[piece]): ndarray, shape (k, channels, 6)."""
+        """Ascending powers of (t - knots[piece]): ndarray, shape (k, channels, 6), [SI]."""
 
     @property
     def jumps(self) -> Array:

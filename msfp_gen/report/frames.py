@@ -107,7 +107,7 @@ def main_direction(path: Array) -> float:
 
 
 def quaternions(where: Poses) -> Array:
-    """Rotation of every body as quaternions x, y, z, w, shape (T, n, 4), with the spin about its own axis (2.27)."""
+    """Rotation of every body as quaternions x, y, z, w, shape (T, n, 4) [-], with the spin about its axis (2.27)."""
     from scipy.spatial.transform import Rotation
 
     axes = np.swapaxes(where.basis, -1, -2).reshape(-1, 3, 3)  # t_1, t_2, t_3 as columns
@@ -116,7 +116,7 @@ def quaternions(where: Poses) -> Array:
 
 
 def states(history: History) -> Array:
-    """State of every surface as index into `STATES`, shape (T, n-1)."""
+    """State of every surface as index into `STATES`, shape (T, n-1) [-]."""
     result = np.where(sliding_surfaces(history), 1.0, 0.0)
     result[history.gap <= 0] = 2.0
     result[separated(history) | (history.normal_force <= 0)] = 3.0
@@ -209,7 +209,7 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
 
 
 def building_rows(result: BuildingResult, count: int) -> Array:
-    """Rows of the view, shape (rows,): evenly in time, with the peaks of displacement and axial force."""
+    """Indices of rows of the view, shape (rows,) [-]: evenly in time, and the peaks of displacement and axial force."""
     time = result.time
     even = np.linspace(0, len(time) - 1, min(len(time), max(count, min(FEWEST, len(time)))))
     peaks = [int(bearing.history.horizontal.argmax()) for bearing in result.bearings]

@@ -103,7 +103,7 @@ class Extremes:
 
 
 def largest(vectors: Array) -> Array:
-    """Largest magnitudes along time by axis and in the horizontal plane: of shape (..., T, 3), shape (..., 4)."""
+    """Largest along time by axis and in the horizontal plane: (..., T, 3) to shape (..., 4) [unit of `vectors`]."""
     radial = np.hypot(vectors[..., 0], vectors[..., 1]).max(axis=-1)
     magnitudes: Array = np.concatenate([np.abs(vectors).max(axis=-2), radial[..., None]], axis=-1)
     return magnitudes

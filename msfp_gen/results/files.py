@@ -242,7 +242,7 @@ def export_columns(
 
 
 class Column(NamedTuple):
-    """One column of the table of a run: variable of the dataset, name, unit, meaning, and values, shape (T,)."""
+    """One column of the table of a run: variable of the dataset, name, unit, meaning, and values, shape (T,) [unit]."""
 
     variable: str
     name: str

@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Positions of a stack in T rows. Bodies 1..n, base first, and surfaces 1..n-1, bottom first; positions in [m].
+    """Positions of a stack in T rows. Bodies 1..n, base first, and surfaces 1..n-1, bottom first.
 
     Attributes:
-        basis: ndarray, shape (T, n, 3, 3): rows t_1, t_2, t_3 of every body, without its spin (2.1)-(2.6).
+        basis: ndarray, shape (T, n, 3, 3), [-]: rows t_1, t_2, t_3 of every body, without its spin (2.1)-(2.6).
         spin: ndarray, shape (T, n), [rad]: phi of every body about its own t_3 (2.27).
-        bottom, top: ndarray, shape (T, n, 3): centres of the lower and upper face of every body.
-        centre: ndarray, shape (T, n-1, 3): sphere centres r_gc; with uplift, those of the sliders.
-        contact: ndarray, shape (T, n-1, 3): contact points (3.14).
-        rim: ndarray, shape (T, n-1, 3): point of the slider nearest to the rim (3.25); on its axis where centred.
+        bottom, top: ndarray, shape (T, n, 3), [m]: centres of the lower and upper face of every body.
+        centre: ndarray, shape (T, n-1, 3), [m]: sphere centres r_gc; with uplift, those of the sliders.
+        contact: ndarray, shape (T, n-1, 3), [m]: contact points (3.14).
+        rim: ndarray, shape (T, n-1, 3), [m]: point of the slider nearest to the rim (3.25); on its axis where centred.
         at_rim: ndarray of bool, shape (T, n-1): whether the rim is in contact.
         force: ndarray, shape (T, n-1, 3), [N]: interface force on the body above; 0 while the surface is separated.
-        line: ndarray, shape (T, n-1, 3): point of the line of force that is nearest to the sphere centre.
+        line: ndarray, shape (T, n-1, 3), [m]: point of the line of force that is nearest to the sphere centre.
     """
 
     basis: Array
@@ -252,12 +252,12 @@ class Plane:
 
     @property
     def along(self) -> Array:
-        """Horizontal unit vector in the plane, ndarray, shape (3,)."""
+        """Horizontal unit vector in the plane, ndarray, shape (3,), [-]."""
         return np.array([np.cos(self.azimuth), np.sin(self.azimuth), 0.0])
 
     @property
     def normal(self) -> Array:
-        """Unit vector across the plane, ndarray, shape (3,)."""
+        """Unit vector across the plane, ndarray, shape (3,), [-]."""
         return np.array([-np.sin(self.azimuth), np.cos(self.azimuth), 0.0])
 
     def project(self, points: Array) -> Array:
@@ -271,10 +271,10 @@ class Section:
 
     Attributes:
         azimuth: of the plane, from E1 [rad].
-        bodies: closed polygon of every body, base first, each ndarray, shape (k, 2); empty if the plane misses it.
-        faces: the face of the slider of every surface, from edge to edge, each ndarray, shape (k, 2).
-        contacts, centres: ndarray, shape (n-1, 2): contact points and sphere centres.
-        points: ndarray, shape (n-1, 2): a point of the line of force of every surface.
+        bodies: closed polygon of every body, base first, each ndarray, shape (k, 2), [m]; empty if the plane misses it.
+        faces: the face of the slider of every surface, from edge to edge, each ndarray, shape (k, 2), [m].
+        contacts, centres: ndarray, shape (n-1, 2), [m]: contact points and sphere centres.
+        points: ndarray, shape (n-1, 2), [m]: a point of the line of force of every surface.
         forces: ndarray, shape (n-1, 2), [N]: interface force of every surface on the body above.
     """
 

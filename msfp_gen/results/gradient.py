@@ -91,7 +91,7 @@ class Gradients:
         )
 
     def largest_numbers(self) -> Array:
-        """Largest magnitude of all derivatives with respect to each parameter, shape (k,); not finite if one is not."""
+        """Largest magnitude of all derivatives by each parameter, shape (k,) [SI]; not finite if one is not."""
         arrays = self.arrays.values()
         largest: Array = np.max([np.abs(a).max(axis=tuple(range(1, a.ndim)), initial=0.0) for a in arrays], axis=0)
         return largest
@@ -113,7 +113,7 @@ SERIES = {
 
 
 def gradients_of_extremes(gradients: Gradients, history: History, recorded: Extremes) -> dict[str, Array]:
-    """Derivatives of `RunData.extremes` by name, each of shape (k, number of values)."""
+    """Derivatives of `RunData.extremes` by name, each of shape (k, number of values) [SI]."""
     found = {}
     for name in (f.name for f in fields(Extremes) if f.name in SERIES):
         values = getattr(recorded, name)

@@ -143,7 +143,7 @@ class BearingRows:
 
     @property
     def direction(self) -> Array:
-        """Unit vector of the largest horizontal displacement, shape (2,); E1 if the bearing did not move."""
+        """Unit vector of the largest horizontal displacement, shape (2,) [-]; E1 if the bearing did not move."""
         peak: Array = self.displacement[self.peak_row, :2]
         size = float(np.hypot(*peak))
         return peak / size if size else np.array([1.0, 0.0])

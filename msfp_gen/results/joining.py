@@ -230,6 +230,6 @@ def checked_times(rows: Array, times: ArrayLike) -> Array:
 
 
 def interpolated(time: Array, values: Array, new_times: Array) -> Array:
-    """Rows of `values`, shape (k, ...) at `time`, at other times by linear interpolation."""
+    """Rows of `values`, shape (k, ...) [unit of `values`] at `time`, at other times by linear interpolation."""
     columns = values.reshape(len(time), -1).T
     return np.stack([np.interp(new_times, time, column) for column in columns], axis=-1).reshape(-1, *values.shape[1:])

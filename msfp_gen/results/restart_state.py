@@ -60,7 +60,7 @@ class RestartState:
         return cls(azimuth=0.0, planar=False, **port.state())
 
     def memory_of(self, law: Law | None) -> Array | None:
-        """Parts of what the surfaces remember for a law, shape (n-1, parts); None where it needs none.
+        """Parts of what the surfaces remember for a law, shape (n-1, parts) [SI]; None where it needs none.
 
         A law of temperature takes those of the monitor of heat where the earlier model had no temperatures.
         """

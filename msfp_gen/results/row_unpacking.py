@@ -20,7 +20,7 @@ _EVENT_KINDS = names(EVENT_KINDS)
 
 
 def finite_rows(rows: Array) -> Array:
-    """The rows of a segment, shape (T, row size), up to the first that is not finite."""
+    """The rows of a segment, shape (T, row size) [SI], up to the first that is not finite."""
     finite = np.isfinite(rows).all(axis=1)
     return rows if finite.all() else rows[: int(finite.argmin())]
 

@@ -128,7 +128,7 @@ class RunData(BearingData):
 
     @property
     def friction_coefficient(self) -> Array:
-        """Friction coefficient mu of every surface, ndarray, shape (T, n-1): recorded, or that of the bearing."""
+        """Friction coefficient mu of every surface, ndarray, shape (T, n-1), [-]: recorded, or that of the bearing."""
         recorded = self.history.friction_coefficient
         if recorded is not None:
             return recorded

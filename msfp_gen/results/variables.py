@@ -56,7 +56,7 @@ class Variable(NamedTuple):
         return {name: text for name, text in about.items() if text}
 
     def of(self, arrays: Mapping[str, Any]) -> Array:
-        """Its values, of the shape of its dimensions. arrays: of a result, by field."""
+        """Its values, of the shape of its dimensions [its unit]. arrays: of a result, by field."""
         values: Array = arrays[self.field][self.part or ...]
         return values
 

@@ -248,8 +248,7 @@ class Bearing:
 
         Per surface, shape (n-1,): radius, capacity, friction, yield_displacement, rim_stiffness, rim_damping,
         contact_damping, seat_damping. Per body, shape (n,), base first with mass and inertia 0: height,
-        centroid, mass, inertia_transverse, inertia_axial, rim_radius, rim_offset. And gravity, shape (). Units as in
-        the fields.
+        centroid, mass, inertia_transverse, inertia_axial, rim_radius, rim_offset. And gravity, shape (). [SI]
         """
         rows = [(b.height, b.centroid, b.mass, *b.moments, b.rim_radius, b.rim_offset) for b in self.bodies]
         arrays = dict(zip(_BODY, np.array([self._base, *rows]).T.copy(), strict=True))

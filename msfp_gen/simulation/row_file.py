@@ -92,7 +92,7 @@ class RowFile:
         self.count, self.checksum = count, found
 
     def read(self, start: int, end: int) -> Array:
-        """Rows from one number to another, shape (T, row size)."""
+        """Rows from one number to another, shape (T, row size) [SI]."""
         at = self._file.tell()
         self._file.seek(start * self._row_bytes)
         rows = np.empty((max(0, end - start), self._size))

@@ -74,7 +74,8 @@ def _effects(scene: Scene) -> Auto:
 class StartSlopes:
     """Derivatives of the state after settling with respect to k parameters.
 
-    q: of the angles, shape (k, n-1, 3) [rad/unit]. h: of the friction state, shape (k, n-1, 2).
+    q: of the angles, shape (k, n-1, 3) [rad per unit of the parameter]. h: of the friction state, shape
+    (k, n-1, 2) [per unit of the parameter].
     """
 
     q: Array

@@ -1,4 +1,4 @@
-"""Public docstrings of arrays state a shape: of what functions and properties return, and of attributes."""
+"""Public docstrings of arrays state shape and unit: of what functions and properties return, and of attributes."""
 
 from __future__ import annotations
 
@@ -14,6 +14,17 @@ SOURCES = [p for p in (ROOT / "msfp_gen").rglob("*.py") if not LINKED & set(p.re
 ARRAY = re.compile(r"\b(Array|ndarray|NDArray)\b")
 # `shape (k, 3)`, `(k, 3)`, `(u,)`, the dimensions of a row of a result, or where it is described.
 SHAPE = re.compile(r"\bshapes?\b|\((?:[\w.+* -]+,)+[\w.+* -]*\)|\bRows\(|\b[Ss]ee `|\b[Aa]s (?:of |in )?`", re.ASCII)
+# `[m/s^2]`, `[N, N m]`, `[-]` for a number, `[SI]` where numbers of several units are side by side, the unit of another
+# value, the dimensions of a row of a result, or where it is described. Truth values and indices have no unit.
+SYMBOL = r"(?:1|m|s|kg|N|J|W|Pa|K|degC|rad|Hz|g)(?:\^-?\d)?"
+UNITS = rf"{SYMBOL}(?:[ /]{SYMBOL})*"
+OF_ANOTHER = r"unit|its unit(?: squared)?|(?:\w+ )*units? of [^\]]+"
+UNIT = re.compile(
+    rf"\[(?:-|SI|{UNITS}(?:, {UNITS})*|{OF_ANOTHER})\]"
+    r"|\bRows\(|\b[Ss]ee `|\b[Aa]s (?:of|in) `|\bunits? (?:of|in) `",
+    re.ASCII,
+)
+UNITLESS_ARRAY = re.compile(r"(?:NDArray\[|ndarray\[Any, np\.dtype\[)np\.(?:bool_|intp|int64)\]")
 
 
 def public(name: str) -> bool:
@@ -21,8 +32,14 @@ def public(name: str) -> bool:
 
 
 def unstated(text: str) -> Iterator[str]:
-    """Names of a module whose arrays have no shape: functions and methods by what they return, and attributes."""
+    """What is missing of the arrays of a module: of what functions and methods return, and of attributes."""
     lines = text.splitlines()
+
+    def missing(name: str, annotation: str, stated: str) -> Iterator[str]:
+        if ARRAY.search(annotation) and not SHAPE.search(stated):
+            yield f"shape of {name}"
+        if ARRAY.search(UNITLESS_ARRAY.sub("", annotation)) and not UNIT.search(stated):
+            yield f"unit of {name}"
 
     def walk(node: ast.Module | ast.ClassDef, owner: str) -> Iterator[str]:
         described = ast.get_docstring(node) or ""
@@ -30,23 +47,21 @@ def unstated(text: str) -> Iterator[str]:
             if isinstance(item, ast.ClassDef) and public(item.name):
                 yield from walk(item, f"{item.name}.")
             elif isinstance(item, ast.FunctionDef) and public(item.name) and item.returns is not None:
-                if ARRAY.search(re.sub(r"Callable\[.*\]", "", ast.unparse(item.returns))) and not SHAPE.search(
-                    ast.get_docstring(item) or ""
-                ):
-                    yield owner + item.name
+                returned = re.sub(r"Callable\[.*\]", "", ast.unparse(item.returns))
+                yield from missing(owner + item.name, returned, ast.get_docstring(item) or "")
             elif owner and isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name):
                 name = item.target.id
                 _, listed, entries = described.partition("Attributes:\n")
                 entry = re.search(rf"^ +(?:\w+, )*{name}(?:, \w+)*: (.+(?:\n {{8,}}.+)*)", entries, re.MULTILINE)
                 stated = (entry[1] if entry else "") if listed else described
                 stated = " ".join([stated, *lines[item.lineno - 1 : item.end_lineno]])
-                if public(name) and ARRAY.search(ast.unparse(item.annotation)) and not SHAPE.search(stated):
-                    yield owner + name
+                if public(name):
+                    yield from missing(owner + name, ast.unparse(item.annotation), stated)
 
     yield from walk(ast.parse(text), "")
 
 
-def test_the_reader_sees_what_has_no_shape() -> None:
+def test_the_reader_sees_what_has_no_shape_or_unit() -> None:
     text = '''
 class Rows:
     """Rows.
@@ -60,25 +75,30 @@ class Rows:
     force: Array
     count: int
     sliding: Array  # (k, n-1) [m]
+    met: NDArray[np.bool_]  # (k, n-1)
 
     def peak(self) -> Array:
         """The largest [N]."""
+
+    def at(self, time: float) -> Array:
+        """Those at a time, shape (3,), by the index rows[i]."""
 
     def _inner(self) -> Array: ...
 
 
 def mean(x: Array) -> Array:
-    """The mean of every column, shape (3,)."""
+    """The mean of every column, shape (3,) [unit of `x`]."""
 
 
 def total(x: Array) -> tuple[float, Array]:
     """The total."""
 '''
-    assert list(unstated(text)) == ["Rows.force", "Rows.peak", "total"]
+    missing = ["shape of Rows.force", "shape of Rows.peak", "unit of Rows.at", "shape of total", "unit of total"]
+    assert list(unstated(text)) == missing
 
 
 @pytest.mark.parametrize("folder", sorted({path.parent.relative_to(ROOT).as_posix() for path in SOURCES}))
-def test_arrays_have_a_shape(folder: str) -> None:
+def test_arrays_have_a_shape_and_a_unit(folder: str) -> None:
     missing = [
         f"{path.name}: {name}"
         for path in sorted((ROOT / folder).glob("*.py"))

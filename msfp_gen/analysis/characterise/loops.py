@@ -70,7 +70,7 @@ class Path(NamedTuple):
 
     @property
     def along(self) -> tuple[Array, Array]:
-        """Displacement and force along the direction, shape (T,) each."""
+        """Displacement [m] and force [N] along the direction, shape (T,) each."""
         return self.u @ self.direction, self.force @ self.direction
 
     @property

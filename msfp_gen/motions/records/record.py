@@ -168,7 +168,7 @@ def derived_note(quantity: str) -> tuple[str, ...]:
 def common_window(columns: list[Array | None]) -> tuple[Array, tuple[str, ...]]:
     """Columns with a common first sample, cut to the length of the shortest; a missing one (None) is zero.
 
-    Returns an ndarray, shape (k, len(columns)), and notes on cut and missing columns.
+    Returns an ndarray, shape (k, len(columns)), [unit of `columns`], and notes on cut and missing columns.
     """
     lengths = [len(c) for c in columns if c is not None]
     shortest = min(lengths)

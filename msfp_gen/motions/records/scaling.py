@@ -283,7 +283,7 @@ class ScaledSuite:
     """Factors of a suite, and the spectra that they give.
 
     Attributes:
-        factors: one for each motion, ndarray, shape (r,).
+        factors: one for each motion, ndarray, shape (r,), [-].
         period: periods of the target, ndarray, shape (p,), [s].
         spectra: pseudo-acceleration of each scaled motion, ndarray, shape (r, p), [m/s^2].
         target: ndarray, shape (p,), [m/s^2].

@@ -115,7 +115,7 @@ class Lines:
             layout: columns in a line and characters in a column, as in a Fortran format.
 
         Returns:
-            ndarray, shape (points,), and the index of the line after them.
+            ndarray, shape (points,), [unit of the file], and the index of the line after them.
         """
         per_line, width = layout
         if not (points and per_line and width):
@@ -198,5 +198,5 @@ def word(pattern: re.Pattern[str], head: Iterable[str]) -> str:
 
 
 def column(values: list[float]) -> Array:
-    """Numbers as an ndarray, shape (k,)."""
+    """Numbers as an ndarray, shape (k,), [unit of `values`]."""
     return np.array(values, dtype=np.float64)

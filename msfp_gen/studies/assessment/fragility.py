@@ -34,7 +34,7 @@ Interval = tuple[float, float]
 class Fit:
     """A fitted curve.
 
-    coefficients: a and b, ndarray, shape (2,). covariance: the inverse of their Fisher information, shape (2, 2).
+    coefficients: a and b, ndarray, shape (2,), [-]. covariance: the inverse of their Fisher information, (2, 2) [-].
     """
 
     coefficients: Array
@@ -58,13 +58,13 @@ class Fit:
         return values[0], values[1]
 
     def probability(self, log_x: Array) -> Array:
-        """Phi(a + b ln x), of the shape of `log_x`."""
+        """Phi(a + b ln x) [-], of the shape of `log_x`."""
         from scipy.special import ndtr
 
         return np.asarray(ndtr(self.coefficients[0] + self.coefficients[1] * log_x))
 
     def band(self, log_x: Array, level: float) -> tuple[Array, Array]:
-        """Pointwise confidence bounds of the probability, each of the shape of `log_x`, from those of a + b ln x."""
+        """Pointwise confidence bounds of the probability [-], of the shape of `log_x`, from those of a + b ln x."""
         from scipy.special import ndtr, ndtri
 
         rows = np.stack([np.ones_like(log_x), log_x], axis=-1)
@@ -153,9 +153,9 @@ class DamageState:
         median_interval, dispersion_interval: their confidence intervals.
         runs, exceeded: numbers of runs that were used, and of those above the threshold.
         left_out: runs that ended early below the threshold.
-        intensity, runs_at, exceeded_at: by intensity, shape (k,): its value and the numbers of runs.
+        intensity, runs_at, exceeded_at: by intensity, shape (k,): its value [its unit] and the numbers of runs.
         fit: the underlying fit, for curves and bands.
-        samples: pairs (intercept, slope) of the bootstrap, ndarray, shape (bootstraps, 2); None without it.
+        samples: pairs (intercept, slope) of the bootstrap, ndarray, shape (bootstraps, 2), [-]; None without it.
         level: of confidence.
         case: value of the column `by`; "" without it.
     """
@@ -177,11 +177,11 @@ class DamageState:
     case: str = ""
 
     def probability(self, intensity: Array) -> Array:
-        """Probability of exceedance, ndarray of the shape of `intensity`."""
+        """Probability of exceedance [-], ndarray of the shape of `intensity`."""
         return self.fit.probability(np.log(intensity))
 
     def band(self, intensity: Array) -> tuple[Array, Array]:
-        """Lower and upper bound of the probability, of the shape of `intensity`, each at `level` of confidence."""
+        """Lower and upper bound of the probability [-], of the shape of `intensity`, each at `level` of confidence."""
         if self.samples is None:
             return self.fit.band(np.log(intensity), self.level)
         from scipy.special import ndtr

@@ -46,7 +46,7 @@ class Goals:
 
     @property
     def signs(self) -> Array:
-        """1 for an objective to be minimised, -1 for one to be maximised, shape (objectives,)."""
+        """1 for an objective to be minimised, -1 for one to be maximised, shape (objectives,) [-]."""
         return np.array([1.0] * len(self.minimise) + [-1.0] * len(self.maximise))
 
 

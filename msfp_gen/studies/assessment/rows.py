@@ -86,7 +86,7 @@ def unknown_column(name: str, known: Sequence[str]) -> InputError:
 
 
 def numbers(rows: Any, name: str) -> Array:
-    """A column as floats, shape (runs,), NaN without a value. Raises InputError: no such column, or one of texts."""
+    """A column as floats, shape (runs,) [its unit]; NaN: no value. Raises InputError: no such column, or texts."""
     if name not in rows.columns:
         raise unknown_column(name, list(rows.columns))
     try:
@@ -96,7 +96,7 @@ def numbers(rows: Any, name: str) -> Array:
 
 
 def intensities(rows: Any, name: str) -> Array:
-    """A column of positive numbers, shape (runs,): an intensity measure. Raises InputError."""
+    """A column of positive numbers, shape (runs,) [its unit]: an intensity measure. Raises InputError."""
     values = numbers(rows, name)
     if not (values > 0).all():
         raise InputError(f"{name}: an intensity measure is above 0 in every run; give another column")
@@ -104,7 +104,7 @@ def intensities(rows: Any, name: str) -> Array:
 
 
 def demands(rows: Any, name: str) -> Array:
-    """A column as demands, shape (runs,): of runs that ended early a lower bound, zero where they have none.
+    """A column as demands, shape (runs,) [its unit]: of runs that ended early a lower bound, zero if they have none.
 
     Raises InputError where a run that reached its end has no value, and for runs that an estimate chose.
     """
@@ -143,8 +143,8 @@ class Samples:
         name, unit: of the quantity.
         statistic: over the runs of a sample.
         axes: names of the random axes.
-        values: of the axes, ndarray, shape (samples, axes).
-        reduced: the statistic of each sample, ndarray, shape (samples,).
+        values: of the axes, ndarray, shape (samples, axes), [units of the axes].
+        reduced: the statistic of each sample, ndarray, shape (samples,), [its unit].
         sampling: the table `[sampling]` of the study.
     """
 

@@ -65,7 +65,7 @@ class SuiteBounds:
         table: the table of factors.
         records: names of the motions.
         sources: column -> quantity. parts: column -> name of its bearing, storey, floor or surface; "" for the whole.
-        values: column -> value in SI, shape (records, cases); NaN where a run has none.
+        values: column -> value, shape (records, cases) [SI]; NaN where a run has none.
         failures: record and case -> message of a run that failed.
         undefined: column -> why runs that reached their end have no value.
         exceeded: record and case -> the verdict of a run that exceeded limits of the device.

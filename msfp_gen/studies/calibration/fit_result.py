@@ -67,7 +67,7 @@ class Fit:
     Attributes:
         scene: the scene with the fitted values; its motion is that of the given scene.
         estimates: of the parameters, then of the offsets.
-        correlation: of the estimates, ndarray, shape (k, k); NaN where one is not determined.
+        correlation: of the estimates, ndarray, shape (k, k), [-]; NaN where one is not determined.
         condition: largest over least singular value of the Jacobian of unit columns.
         tests: measured and fitted forces.
         unidentified: one line for each set of parameters that the tests do not tell apart, or do not see.

@@ -96,7 +96,7 @@ def end_fit(scene: Scene, residuals: Residuals, max_evaluations: int = 100) -> F
 
 
 def search_range(residuals: Residuals) -> tuple[Array, Array, Array]:
-    """Start, least and largest value of every unknown over its scale, shape (k,); offsets of force have no bounds."""
+    """Start, least and largest value of every unknown over its scale, shape (k,) [-]; offsets of force are free."""
     values = np.array([(u.start, u.low, u.high) for u in residuals.unknowns]).reshape(-1, 3)
     offsets = np.tile([0.0, -np.inf, np.inf], (residuals.offsets, 1))
     start, low, high = np.vstack([values, offsets]).T / residuals.scale
@@ -232,7 +232,7 @@ AT_BOUND = 1e-3  # of the range: distance from a bound within which a value is a
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Unknowns x over their scales, shape (k,), and what is known of their errors.
+    """Unknowns x over their scales, shape (k,) [-], and what is known of their errors.
 
     end: the evaluation at x. known: what its Jacobian tells. spread: under the noise of the tests. at_bound: which are
     at a bound. rtol: of the runs. run_error: of x, from the errors of the runs, shape (k,); infinite where it could not
@@ -250,7 +250,7 @@ class Solution:
 
     @property
     def half(self) -> Array:
-        """Half widths of the intervals, which contain the error of the runs, shape (k,)."""
+        """Half widths of the intervals, which contain the error of the runs, shape (k,) [-]."""
         return self.spread.half + self.run_error
 
 
@@ -318,7 +318,7 @@ class _WithinError(Exception):
 
 
 def least_squares(residuals: Residuals, start: Array, low: Array, high: Array, most: int) -> tuple[Array, Evaluation]:
-    """The unknowns between two bounds, shape (k,), for which the sum of squares is least, and the evaluation there.
+    """The unknowns between two bounds, shape (k,) [-], for which the sum of squares is least, and the evaluation there.
 
     The search also ends where the next step is shorter than a tenth of the standard errors: the noise of the tests
     makes smaller ones meaningless, and the error of runs, which varies irregularly with the values, hides them.

@@ -30,8 +30,8 @@ UNCERTAIN = 0.5  # half width of an interval over the value from which the value
 class Noise(NamedTuple):
     """Stationary noise of one test.
 
-    variance: of a weighted residual. correlation: at lags of 0, 1, ... rows, shape (T,). freedom: effective number of
-    rows, less the share of the unknowns that this test determines.
+    variance: of a weighted residual. correlation: at lags of 0, 1, ... rows, shape (T,) [-]. freedom: effective number
+    of rows, less the share of the unknowns that this test determines.
     """
 
     variance: float
@@ -39,7 +39,7 @@ class Noise(NamedTuple):
     freedom: float
 
     def covariance_times(self, columns: Array) -> Array:
-        """The covariance matrix of all rows times columns, shape (T, m)."""
+        """The covariance matrix of all rows times columns, shape (T, m) [unit of `columns`]."""
         from scipy.linalg import matmul_toeplitz
 
         return self.variance * np.asarray(matmul_toeplitz(self.correlation, columns))
@@ -126,9 +126,9 @@ def _lag_sums(first: Array, second: Array) -> Array:
 class Identified(NamedTuple):
     """What a Jacobian J tells of the unknowns.
 
-    basis: orthonormal, of the combinations that change the residuals, shape (N, m). factors: of the pseudo-inverse,
-    which is `factors @ basis.T`, shape (k, m). undetermined: unknowns without an interval, shape (k,). condition: of
-    the Jacobian with columns of unit length. lines: on what is not identified.
+    basis: orthonormal, of the combinations that change the residuals, shape (N, m) [-]. factors: of the
+    pseudo-inverse, which is `factors @ basis.T`, shape (k, m) [-]. undetermined: unknowns without an interval, (k,).
+    condition: of the Jacobian with columns of unit length. lines: on what is not identified.
     """
 
     basis: Array
@@ -141,8 +141,8 @@ class Identified(NamedTuple):
 class Spread(NamedTuple):
     """Of the unknowns over their scales, infinite where they are not determined.
 
-    deviation: standard deviations, shape (k,). half: half widths of the intervals, shape (k,). correlation: shape
-    (k, k), NaN in the rows of a value that is not determined.
+    deviation: standard deviations, shape (k,) [-]. half: half widths of the intervals, shape (k,) [-]. correlation:
+    shape (k, k) [-], NaN in the rows of a value that is not determined.
     """
 
     deviation: Array

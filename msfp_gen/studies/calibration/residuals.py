@@ -151,7 +151,7 @@ class Evaluation:
         return self.square / float(max(rows - unknowns, 1))
 
     def step(self, free: NDArray[np.bool_]) -> Array:
-        """Step to the minimum of the linearised sum of squares, of the unknowns that are free, shape (k,)."""
+        """Step to the minimum of the linearised sum of squares, of the unknowns that are free, shape (k,) [-]."""
         step = np.zeros(len(free))
         step[free] = np.linalg.lstsq(self.jacobian[:, free], -self.residuals, rcond=1 / SINGULAR)[0]
         return step
@@ -226,7 +226,7 @@ class Residuals:
         return evaluation
 
     def split(self, rows: Array) -> list[Array]:
-        """Rows of all tests, shape (N, ...), as those of each."""
+        """Rows of all tests, shape (N, ...) [unit of `rows`], as those of each."""
         return np.split(rows, np.cumsum([len(test.time) for test in self.tests])[:-1])
 
     def _evaluate(self, values: Array, jacobian: Array | None) -> Evaluation:

@@ -29,7 +29,7 @@ class Chain:
 
 
 def shares_of_variance(correlations: Array) -> Array:
-    """The part of the variance of the exact model that each level of a chain has to estimate, shape (k,).
+    """The part of the variance of the exact model that each level of a chain has to estimate, shape (k,) [-].
 
     correlations: of every model with the exact one, which comes first, falling, shape (k,). Each level estimates its
     difference from the next; the last one estimates its own mean.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Crossings:
-    """Logarithms of scales at which draws reach a threshold, shape (k,), and how many lie beyond those of the study.
+    """Logarithms of scales at which draws reach a threshold, shape (k,) [-], and how many are beyond the study.
 
     runs: that the draws took, all together.
     """

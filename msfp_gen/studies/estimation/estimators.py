@@ -34,8 +34,8 @@ NORMAL = 1.702  # slope of the logistic curve that is nearest to the normal law
 class Runs:
     """Runs of one model.
 
-    draws: their numbers, rising, shape (k,). values: of the quantity; infinite where a run failed. chances: with which
-    each draw was chosen; 1 for those of the pilot and where all draws are run.
+    draws: their numbers, rising, shape (k,). values: of the quantity [its unit]; infinite where a run failed. chances:
+    with which each draw was chosen [-]; 1 for those of the pilot and where all draws are run.
     """
 
     draws: Indices
@@ -51,7 +51,7 @@ class Moment:
         value: the estimate.
         variance: of it.
         freedom: degrees of freedom of the variance.
-        variances: that each level has to estimate, shape (levels,), for `optimal_runs`, exact first.
+        variances: that each level has to estimate, shape (levels,) [its unit squared], for `optimal_runs`, exact first.
         unseen: whether the variance is mostly that of errors of the prediction which no run showed; it falls with the
             square of the number of exact runs.
     """
@@ -192,7 +192,7 @@ def _newton(rows: Array, y: Array, offset: Array, start: Array, prior: Array) ->
 
 
 def feature(values: Array) -> Array:
-    """Values of a model, shape (runs,), for the fit of a prediction: a run that failed is the largest of the others."""
+    """Values of a model for the fit of a prediction, shape (runs,) [unit of `values`]; of a failed run the largest."""
     finite = values[np.isfinite(values)]
     most = float(finite.max()) if len(finite) else 0.0
     return np.where(np.isfinite(values), values, most)
@@ -201,7 +201,7 @@ def feature(values: Array) -> Array:
 def predictions(
     fit: Fit, draws: Indices, x: Array, target_draws: Indices, target: Array, weights: Array | None = None
 ) -> Array:
-    """For every draw the prediction of a target from x, fitted to the targets of other folds; shape of `draws`.
+    """For every draw the prediction of a target from x, fitted to other folds; shape of `draws` [unit of `target`].
 
     target_draws are among `draws`. weights: of the targets in the fit; None: equal.
     """
@@ -336,7 +336,7 @@ def quantile_of(
 
 
 def uncertainty(x: Array, values: Array, threshold: float | None, at: Array) -> Array:
-    """In proportion to which chance a draw should be run exactly: shape of `at` (Neyman, 1934).
+    """In proportion to which chance a draw should be run exactly [-]: shape of `at` (Neyman, 1934).
 
     threshold: of a probability: the deviation of a yes or no with the predicted share, at least a fifth of the
     largest; a rare event lies beyond the range of the pilot, so an extended prediction counts as well. None: for a

@@ -45,7 +45,7 @@ class Source(Protocol):
     population: int | None
 
     def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
-        """The quantity at draws, shape (draws,), computed if not known; which runs ended early: what they reached.
+        """The quantity at draws, shape (draws,) [its unit], computed if need be; which ended early: what they reached.
 
         Infinite where a run has none. scales: index of the value of the axis `scale` of each run, in place of that of
         the draw.
@@ -69,7 +69,7 @@ class Draws:
         self._order = np.random.default_rng([seed, 0]).permutation(self.cells) if self.population else None
 
     def of(self, numbers: Indices) -> tuple[Indices, Array]:
-        """Of draws by number, shape (draws,): the combination of the grid, from 0, and values of the random axes."""
+        """Of draws by number, (draws,): the combination, from 0, and values of the random axes [units of the axes]."""
         if self._order is not None:
             return self._order[numbers], np.zeros((len(numbers), 0))
         cells, values = zip(

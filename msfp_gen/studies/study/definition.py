@@ -56,7 +56,7 @@ class Task:
         number: of the chunk, from 0.
         first: index of its first run, from 0.
         codes: of each grid axis, ndarray, shape (runs,): the indices of its values.
-        drawn: values of the random axes, ndarray, shape (runs, random axes).
+        drawn: values of the random axes, ndarray, shape (runs, random axes), [units of the axes].
     """
 
     number: int
@@ -125,7 +125,7 @@ class Study:
 
     @cached_property
     def samples(self) -> Array:
-        """Values of the random axes, ndarray, shape (samples, random axes); one row without random axes."""
+        """Values of the random axes, ndarray, shape (samples, axes), [units of the axes]; one row without any."""
         return np.zeros((1, 0)) if self.sampling is None else self.sampling.drawn(self.distributions)
 
     @cached_property

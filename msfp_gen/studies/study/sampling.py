@@ -59,7 +59,7 @@ class Distribution:
             raise InputError(f"between = {list(self.between)}: give bounds between which the distribution has values")
 
     def values(self, shares: Array) -> Array:
-        """The values below which these `shares` of the distribution lie, in (0, 1); arrays of one shape."""
+        """The values below which these `shares` of the distribution lie, in (0, 1); of their shape [its unit]."""
         if self.between is not None:
             low, high = (self.share(bound) for bound in self.between)
             shares = low + shares * (high - low)
@@ -125,7 +125,7 @@ class Sampling:
             )
 
     def drawn(self, distributions: Sequence[Distribution]) -> Array:
-        """Values of the axes with these distributions, ndarray, shape (samples, axes). Raises InputError."""
+        """Values of axes with these distributions, shape (samples, axes) [units of the axes]. Raises InputError."""
         count = len(distributions)
         if self.values is not None:
             if any(len(row) != count for row in self.values):
@@ -140,14 +140,14 @@ class Sampling:
         return values_at(self.shares(count), distributions)
 
     def shares(self, axes: int) -> Array:
-        """Shares of the distributions, ndarray, shape (samples, axes), in (0, 1); equal for equal seeds."""
+        """Shares of the distributions, ndarray, shape (samples, axes), [-], in (0, 1); equal for equal seeds."""
         if not axes:
             return np.zeros((1, 0))
         return np.clip(_DRAWS[self.method](self, axes), *WITHIN)
 
 
 def values_at(shares: Array, distributions: Sequence[Distribution]) -> Array:
-    """The values below which these shares of the distributions lie, ndarrays, shape (samples, axes)."""
+    """The values below which these shares of the distributions lie, shape (samples, axes) [units of the axes]."""
     inside = np.clip(shares, *WITHIN)
     return np.column_stack([one.values(inside[:, index]) for index, one in enumerate(distributions)])
 
