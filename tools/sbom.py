@@ -1,7 +1,8 @@
 """Write the bill of materials of the distribution, CycloneDX 1.6: `python tools/sbom.py ENVIRONMENT dist/*`.
 
 cyclonedx-py states the packages of an environment in which the distribution is installed, with versions, licences and
-who needs whom. Added are the sha256 of the archives, and what the archives themselves contain of others: three.js.
+who needs whom. Added are the sha256 of the archives, and what the archives themselves contain of others: three.js and
+the headers of FMI.
 SOURCE_DATE_EPOCH sets the time that is stated.
 """
 
@@ -23,6 +24,7 @@ from quick import QUICK, parser
 
 ROOT = Path(__file__).resolve().parents[1]
 THREE = ROOT / "msfp_gen" / "report" / "assets" / "three.min.js"
+FMI = ROOT / "msfp_gen" / "fmu" / "assets" / "standard"
 
 
 def packages(environment: Path) -> dict[str, Any]:
@@ -46,32 +48,46 @@ def archives(paths: list[Path]) -> list[dict[str, Any]]:
     ]
 
 
-def contained() -> dict[str, Any]:
-    """three.js, with the version that the first line of its file states."""
-    found = re.match(r"/\*! three\.js (\S+) \| (\S+) \|", THREE.read_text(encoding="utf-8"))
+def contained() -> list[dict[str, Any]]:
+    """three.js, with the version that the first line of its file states, and the headers of FMI with theirs."""
+    version, licence = stated(THREE, r"/\*! three\.js (\S+) \| (\S+) \|")
+    three = component("three", version, licence, f"pkg:npm/three@{version}")
+    (second,) = stated(FMI / "fmi2Functions.h", r"FMI (2\.[\d.]+) Model Exchange")
+    (third,) = stated(FMI / "fmi3Functions.h", r'fmi3Version "(\S+)"')
+    home = "pkg:github/modelica/fmi-standard"
+    return [three, *(component("fmi-standard", each, "BSD-2-Clause", f"{home}@v{each}") for each in (second, third))]
+
+
+def stated(path: Path, pattern: str) -> tuple[str, ...]:
+    """What a file says of itself; raises SystemExit where it does not."""
+    found = re.search(pattern, path.read_text(encoding="utf-8"))
     if found is None:
-        raise SystemExit(f"error: {THREE}: its first line states no version and licence")
-    version, licence = found.groups()
+        raise SystemExit(f"error: {path}: it does not state its version")
+    return found.groups()
+
+
+def component(name: str, version: str, licence: str, purl: str) -> dict[str, Any]:
+    """A library of CycloneDX."""
     return {
         "type": "library",
-        "bom-ref": f"three@{version}",
-        "name": "three",
+        "bom-ref": f"{name}@{version}",
+        "name": name,
         "version": version,
         "licenses": [{"license": {"id": licence}}],
-        "purl": f"pkg:npm/three@{version}",
+        "purl": purl,
     }
 
 
 def bill(environment: Path, paths: list[Path]) -> str:
     """The document; raises SystemExit where it does not follow the schema."""
     document = packages(environment)
-    main, three = document["metadata"]["component"], contained()
-    main["components"] = [*archives(paths), three]
+    main, others = document["metadata"]["component"], contained()
+    main["components"] = [*archives(paths), *others]
     main["purl"] = f"pkg:pypi/{main['name']}@{main['version']}"
     for node in document["dependencies"]:
         if node["ref"] == main["bom-ref"]:
-            node["dependsOn"] = sorted([*node["dependsOn"], three["bom-ref"]])
-    document["dependencies"].append({"ref": three["bom-ref"]})
+            node["dependsOn"] = sorted([*node["dependsOn"], *(other["bom-ref"] for other in others)])
+    document["dependencies"] += [{"ref": other["bom-ref"]} for other in others]
     text = json.dumps(document, indent=2, sort_keys=True) + "\n"
     error = JsonStrictValidator(SchemaVersion.V1_6).validate_str(text)
     if error is not None:

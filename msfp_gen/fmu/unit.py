@@ -35,7 +35,7 @@ from msfp_gen.version import __version__
 VERSIONS = (2, 3)
 KINDS = {"me": "ModelExchange", "cs": "CoSimulation"}  # in the order of the schema
 SUFFIXES = (".fmu",)
-WRITTEN = ("fmu.c", "fmu_bearing.c", "fmu_state.c", "fmu_exchange.c", "fmu.h")
+WRITTEN = ("fmu.c", "fmu_bearing.c", "fmu_state.c", "fmu_exchange.c", "fmu.h", "fmi.h")
 DATE = (1980, 1, 1, 0, 0, 0)  # of the files in the archive: the same scene gives the same bytes
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("win", ".dll")}
 _MACHINES = {"AMD64": "x86_64", "arm64": "aarch64"}
@@ -145,10 +145,13 @@ def _unit(scene: Scene, name: str, version: int, exchange: bool) -> Unit:
 
 
 def _written(version: int) -> dict[str, str]:
-    """The C files of the unit that are the same for every scene."""
+    """The C files of the unit that are the same for every scene, and the headers of the standard."""
     folder = files(__package__).joinpath("assets")
-    names = (*WRITTEN, f"fmi{version}.c")
-    return {name: folder.joinpath(name).read_text(encoding="utf-8") for name in names}
+    headers = [file for file in folder.joinpath("standard").iterdir() if file.name.startswith(f"fmi{version}")]
+    own = [folder.joinpath(name) for name in (*WRITTEN, f"fmi{version}.c")]
+    return {
+        file.name: file.read_text(encoding="utf-8") for file in (*own, *sorted(headers, key=lambda file: file.name))
+    }
 
 
 def _files(

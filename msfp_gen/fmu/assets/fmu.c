@@ -54,11 +54,17 @@ void fmu_free(fmu *f)
     free(f);
 }
 
-void fmu_reset(fmu *f)
+fmu_status fmu_go(fmu *f, fmu_phase phase)
+{
+    f->phase = phase;
+    return FMU_OK;
+}
+
+fmu_status fmu_reset(fmu *f)
 {
     fmu_release(f);
     memcpy(f->values, fmu_start, sizeof f->values);
-    f->phase = FMU_INSTANTIATED;
+    return fmu_go(f, FMU_INSTANTIATED);
 }
 
 int fmu_allowed(fmu *f, const char *call, unsigned phases)
@@ -92,6 +98,12 @@ fmu_status fmu_ready(fmu *f)
             return status;
     }
     return f->exchange && !f->known ? fmu_exchange_evaluate(f) : FMU_OK;
+}
+
+fmu_status fmu_initialised(fmu *f)
+{
+    const fmu_status status = fmu_ready(f);
+    return status == FMU_OK ? fmu_go(f, f->exchange ? FMU_EVENTS : FMU_RUNNING) : status;
 }
 
 static int is_boolean(unsigned reference) { return reference >= FMU_BOOLEANS; }
@@ -163,10 +175,7 @@ static int exchanging(const fmu *f, const char *call)
 
 fmu_status fmu_enter(fmu *f, const char *call, fmu_phase phase)
 {
-    if (!exchanging(f, call))
-        return FMU_ERROR;
-    f->phase = phase;
-    return FMU_OK;
+    return exchanging(f, call) ? fmu_go(f, phase) : FMU_ERROR;
 }
 
 fmu_status fmu_set_time(fmu *f, const char *call, double time)
@@ -224,14 +233,15 @@ static void extrapolate(const fmu *f, fmu_step_data *s)
     }
 }
 
-fmu_status fmu_step(fmu *f, double time, double step, double *reached)
+fmu_status fmu_step(fmu *f, const char *call, double time, double step)
 {
-    fmu_status status = fmu_ready(f);
+    if (f->exchange)
+        return fmu_fail(f, FMU_ERROR, "%s: this instance is for Model Exchange", call);
+    const fmu_status status = fmu_ready(f);
     if (status != FMU_OK)
         return status;
     const msfp_api *api = FMU_MODEL();
     const double start = api->port_time(f->port);
-    *reached = start;
     if (!(fabs(time - start) <= time_tolerance * fmax(1.0, fabs(start))))
         return fmu_fail(f, FMU_ERROR, "communication point = %.12g s: the unit is at %.12g s; go on from there", time, start);
     if (!(step > 0.0 && step < INFINITY))
@@ -250,7 +260,7 @@ fmu_status fmu_step(fmu *f, double time, double step, double *reached)
     f->stepped = 1;
     f->last = now;
     memset(f->have, 0, sizeof f->have);
-    f->values[FMU_TIME] = *reached = now.end;
+    f->values[FMU_TIME] = now.end;
     fmu_outputs(f, row, wrench, now.ends, f->values + FMU_OUTPUTS);
     return FMU_OK;
 }
@@ -328,6 +338,24 @@ fmu_status fmu_derivative(fmu *f, const unsigned *unknowns, size_t unknown_count
         }
         for (size_t i = 0; i < unknown_count; ++i)
             sensitivity[i] += f->jacobian[order][unknowns[i] - FMU_OUTPUTS][freedom] * seed[j];
+    }
+    return FMU_OK;
+}
+
+fmu_status fmu_adjoint(fmu *f, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns, size_t known_count,
+                       const double *seed, double *sensitivity)
+{
+    double column[FMU_STATES + FMU_OUTPUT_COUNT] = { 0.0 };
+    if (unknown_count > sizeof column / sizeof *column)
+        return fmu_fail(f, FMU_ERROR, "adjoint derivative: no variable twice");
+    for (size_t j = 0; j < known_count; ++j) {
+        const double one = 1.0;
+        const fmu_status status = fmu_derivative(f, unknowns, unknown_count, knowns + j, 1, &one, column);
+        if (status != FMU_OK)
+            return status;
+        sensitivity[j] = 0.0;
+        for (size_t i = 0; i < unknown_count; ++i)
+            sensitivity[j] += column[i] * seed[i];
     }
     return FMU_OK;
 }

@@ -60,10 +60,13 @@ void fmu_free(fmu *f);
 /* Whether a call may be made in this phase; phases: bits FMU_AT. */
 int fmu_allowed(fmu *f, const char *call, unsigned phases);
 fmu_status fmu_fail(const fmu *f, fmu_status status, const char *format, ...);
-void fmu_reset(fmu *f);
+fmu_status fmu_reset(fmu *f);
+fmu_status fmu_go(fmu *f, fmu_phase phase);
 /* Length of the run: start [s], and the relative tolerance where it is defined (else 0). */
 fmu_status fmu_begin(fmu *f, double start, double tolerance);
 fmu_status fmu_ready(fmu *f);
+/* Ready, and in the phase after the initialization mode. */
+fmu_status fmu_initialised(fmu *f);
 fmu_status fmu_get(fmu *f, const unsigned *references, size_t count, int boolean, double *values);
 fmu_status fmu_set(fmu *f, const unsigned *references, size_t count, int boolean, const double *values);
 /* Of Model Exchange alone, as `call`: enter a phase; the time of the importer [s]. */
@@ -72,21 +75,23 @@ fmu_status fmu_set_time(fmu *f, const char *call, double time);
 /* All states; a list of `size` numbers as they are now. */
 fmu_status fmu_set_states(fmu *f, const double *states, size_t count);
 fmu_status fmu_get_list(fmu *f, const double *list, size_t size, double *values, size_t count);
-/* From `time` to `time + step` [s]. reached receives the time of the committed state. */
-fmu_status fmu_step(fmu *f, double time, double step, double *reached);
+/* In Co-Simulation, as `call`: from `time` to `time + step` [s]. */
+fmu_status fmu_step(fmu *f, const char *call, double time, double step);
 /* sensitivity [unknowns] += derivative along seed [knowns]. */
 fmu_status fmu_derivative(fmu *f, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,
                           size_t known_count, const double *seed, double *sensitivity);
+/* sensitivity [knowns] = sum over unknowns of seed times derivative. */
+fmu_status fmu_adjoint(fmu *f, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns, size_t known_count,
+                       const double *seed, double *sensitivity);
 
-/* ---- fmu_state.c: the state of a unit as bytes ---- */
+/* ---- fmu_state.c: the state of a unit as bytes, as the functions of the standard with these names ---- */
 
-size_t fmu_state_size(const fmu *f);
-void fmu_state_write(fmu *f, void *state);
-fmu_status fmu_state_read(fmu *f, const void *state);
-/* Size of a state of this process. */
-size_t fmu_state_length(const void *state);
-/* Size of a state; 0 where the bytes are none of this unit. */
-size_t fmu_state_valid(const void *state, size_t size);
+fmu_status fmu_state_get(fmu *f, void **state);
+fmu_status fmu_state_set(fmu *f, const void *state);
+fmu_status fmu_state_free(void **state);
+fmu_status fmu_state_length(const fmu *f, const void *state, size_t *size);
+fmu_status fmu_state_to_bytes(const fmu *f, const void *state, void *bytes, size_t size);
+fmu_status fmu_state_from_bytes(const fmu *f, const void *bytes, size_t size, void **state);
 
 /* ---- fmu_bearing.c: the bearing of the parameters ---- */
 

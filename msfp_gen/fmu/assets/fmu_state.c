@@ -19,14 +19,26 @@ static uint64_t checksum(const head *h)
     return msfp_hash(MSFP_HASH_START, (const char *)h + offsetof(head, phase), h->size - offsetof(head, phase));
 }
 
-size_t fmu_state_size(const fmu *f) { return sizeof(head) + 2 * f->size; }
-
-void fmu_state_write(fmu *f, void *state)
+static void *memory(const fmu *f, size_t size)
 {
-    head *h = state;
+    void *bytes = malloc(size);
+    if (!bytes)
+        fmu_fail(f, FMU_ERROR, "state: no memory");
+    return bytes;
+}
+
+fmu_status fmu_state_get(fmu *f, void **state)
+{
+    const size_t size = sizeof(head) + 2 * f->size;
+    if (!state)
+        return fmu_fail(f, FMU_ERROR, "state: give the address of one");
+    free(*state);
+    head *h = *state = memory(f, size);
+    if (!h)
+        return FMU_ERROR;
     memset(h, 0, sizeof *h);
     strncpy(h->token, FMU_TOKEN, sizeof h->token - 1);
-    h->size = fmu_state_size(f);
+    h->size = size;
     h->phase = (int32_t)f->phase;
     h->exchange = f->exchange;
     h->stepped = f->stepped;
@@ -34,34 +46,61 @@ void fmu_state_write(fmu *f, void *state)
     h->last = f->last;
     memcpy(h->values, f->values, sizeof h->values);
     if (f->size) {
-        memcpy((char *)state + sizeof *h, f->before, f->size);
-        FMU_MODEL()->port_snapshot_write(f->port, (char *)state + sizeof *h + f->size);
+        memcpy((char *)(h + 1), f->before, f->size);
+        FMU_MODEL()->port_snapshot_write(f->port, (char *)(h + 1) + f->size);
     }
     h->sum = checksum(h);
+    return FMU_OK;
 }
 
-size_t fmu_state_length(const void *state) { return (size_t)((const head *)state)->size; }
-
-size_t fmu_state_valid(const void *state, size_t size)
+fmu_status fmu_state_free(void **state)
 {
-    head h;
-    if (!state || size < sizeof h)
-        return 0;
-    memcpy(&h, state, sizeof h);
-    if (strncmp(h.token, FMU_TOKEN, sizeof h.token) != 0 || h.size != size)
-        return 0;
-    head *copy = malloc(size); /* the bytes of the importer may lie at any address */
-    if (!copy)
-        return 0;
-    memcpy(copy, state, size);
-    const int sound = checksum(copy) == h.sum;
-    free(copy);
-    return sound ? size : 0;
+    if (state) {
+        free(*state);
+        *state = NULL;
+    }
+    return FMU_OK;
 }
 
-fmu_status fmu_state_read(fmu *f, const void *state)
+fmu_status fmu_state_length(const fmu *f, const void *state, size_t *size)
+{
+    if (!state || !size)
+        return fmu_fail(f, FMU_ERROR, "state: give one, and the address of a size");
+    *size = (size_t)((const head *)state)->size;
+    return FMU_OK;
+}
+
+fmu_status fmu_state_to_bytes(const fmu *f, const void *state, void *bytes, size_t size)
 {
     const head *h = state;
+    if (!h || size < h->size)
+        return fmu_fail(f, FMU_ERROR, "state: %zu bytes are too few for it", size);
+    memcpy(bytes, h, h->size);
+    return FMU_OK;
+}
+
+fmu_status fmu_state_from_bytes(const fmu *f, const void *bytes, size_t size, void **state)
+{
+    if (state && bytes && size >= sizeof(head)) {
+        head *h = memory(f, size); /* the bytes of the importer may lie at any address */
+        if (!h)
+            return FMU_ERROR;
+        memcpy(h, bytes, size);
+        if (strncmp(h->token, FMU_TOKEN, sizeof h->token) == 0 && h->size == size && checksum(h) == h->sum) {
+            free(*state);
+            *state = h;
+            return FMU_OK;
+        }
+        free(h);
+    }
+    return fmu_fail(f, FMU_ERROR, "state: these bytes are no state of this unit, or are damaged");
+}
+
+fmu_status fmu_state_set(fmu *f, const void *state)
+{
+    const head *h = state;
+    if (!h)
+        return fmu_fail(f, FMU_ERROR, "state: give one");
     const size_t size = (h->size - sizeof *h) / 2;
     if (h->exchange != f->exchange)
         return fmu_fail(f, FMU_ERROR, "state: it is of a unit instantiated for %s",
