@@ -164,7 +164,7 @@ def _sources(rows: Sequence[Row]) -> dict[str, Source]:
     for row in rows:
         of_building = row.counts.bearings > 0
         counts[of_building] = counts.get(of_building, Counts()).or_more(row.counts)
-    sources = {name: source for _, each in sorted(counts.items()) for name, source in catalogue(each).items()}
+    sources = {name: source for _, count in sorted(counts.items()) for name, source in catalogue(count).items()}
     return {name: source for name, source in sources.items() if not source.quantity.characterised}
 
 

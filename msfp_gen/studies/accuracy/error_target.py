@@ -147,8 +147,8 @@ def simulate_within(
     scene = replace(scene, solver=replace(scene.solver, method=METHOD))
     effects, effect_reasons = effects_for(scene, error)
     scene = replace(scene, effects=effects)
-    for each in (scene, with_all_effects(scene)):
-        build_model(each.bearing.layout, each.modelled)  # once, and not within the budget
+    for candidate in (scene, with_all_effects(scene)):
+        build_model(candidate.bearing.layout, candidate.modelled)  # once, and not within the budget
     begin = time.perf_counter()
     search = _Search(scene, METHOD, error, begin + budget)
     try:

@@ -207,7 +207,7 @@ def _objectives(designs: Any, goals: Goals) -> tuple[Array, Array]:
 def _front(parts: Sequence[Any], goals: Goals, folder: Path) -> Front:
     import pandas as pd
 
-    designs = pd.concat([each.drop(columns="ended") for each in parts], ignore_index=True)
+    designs = pd.concat([part.drop(columns="ended") for part in parts], ignore_index=True)
     designs["front"] = designs.feasible.to_numpy() & not_dominated(
         np.where(designs.feasible.to_numpy()[:, None], designs[list(goals.names)].to_numpy() * goals.signs, np.inf)
     )

@@ -22,13 +22,13 @@ class Rule(NamedTuple):
     """How a code combines factors.
 
     Attributes:
-        each: whether the adjustment reduces each environmental factor, or their product.
+        separately: whether the adjustment reduces each environmental factor, or their product.
         adjustment: value that the code fixes; None if the table gives it.
         formula: the rule as text.
         remedy: values to give, for error messages.
     """
 
-    each: bool
+    separately: bool
     adjustment: float | None
     formula: str
     remedy: str
@@ -109,7 +109,7 @@ class FactorTable:
 
     def _combined(self, factor: Factor, end: int) -> float:
         environment = [pair[end] for pair in factor.environment.values()]
-        adjusted = environment if RULES[self.rule].each else [prod(environment)]
+        adjusted = environment if RULES[self.rule].separately else [prod(environment)]
         direct = [pair[end] for pair in factor.direct.values()]
         return prod(1 + self.adjustment * (value - 1) for value in adjusted) * prod(direct)
 

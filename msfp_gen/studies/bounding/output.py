@@ -165,8 +165,8 @@ def _loop(result: Result | BuildingResult | None) -> tuple[Array, Array]:
     """Displacement across the bearing [m] and force on its top [N], of a building their mean and sum, shape (k, 3)."""
     assert result is not None  # cases without rows are not drawn
     if isinstance(result, BuildingResult):
-        u = np.mean([each.history.displacement for each in result.bearings], axis=0)
-        return u, np.sum([each.history.top_force for each in result.bearings], axis=0)
+        u = np.mean([bearing.history.displacement for bearing in result.bearings], axis=0)
+        return u, np.sum([bearing.history.top_force for bearing in result.bearings], axis=0)
     return result.history.displacement, result.history.top_force
 
 

@@ -217,9 +217,9 @@ def bounded_scenes(scene: AnyScene, table: FactorTable) -> dict[str, AnyScene]:
     it. Raises InputError as `bound`.
     """
     scenes = {case: bounded_scene(scene, table, case) for case in CASES}
-    buildings = {case: each for case, each in scenes.items() if isinstance(each, BuildingScene)}
-    lifting = np.any([[effects.uplift for effects in each.modelled] for each in buildings.values()], axis=0)
-    return scenes | {case: _lifting(each, lifting) for case, each in buildings.items()}
+    buildings = {case: bounded for case, bounded in scenes.items() if isinstance(bounded, BuildingScene)}
+    lifting = np.any([[effects.uplift for effects in bounded.modelled] for bounded in buildings.values()], axis=0)
+    return scenes | {case: _lifting(bounded, lifting) for case, bounded in buildings.items()}
 
 
 def _lifting(scene: BuildingScene, lifting: Sequence[bool]) -> BuildingScene:
@@ -238,15 +238,15 @@ def bounded_scene(scene: AnyScene, table: FactorTable, case: str) -> AnyScene:
         bearing = _bounded(scene.bearing, scene.law[1], table, case)
         return scene if case == "nominal" else replace(scene, bearing=bearing, name=label)
     bearings = []
-    for index, each in enumerate(scene.bearings):
-        requested = each.effects or Auto()
+    for index, mount in enumerate(scene.bearings):
+        requested = mount.effects or Auto()
         formula = requested.friction_law
-        word = requested.friction or select_friction(each.bearing, formula)
+        word = requested.friction or select_friction(mount.bearing, formula)
         try:
-            bearing = _bounded(each.bearing, law_of(word, formula), table, case)
+            bearing = _bounded(mount.bearing, law_of(word, formula), table, case)
         except InputError as error:
             raise InputError(f"{scene.label(index)}: {error}") from None
-        bearings.append(replace(each, bearing=bearing))
+        bearings.append(replace(mount, bearing=bearing))
     return scene if case == "nominal" else replace(scene, bearings=bearings, name=label)
 
 

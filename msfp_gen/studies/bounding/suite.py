@@ -121,7 +121,7 @@ class SuiteBounds:
         return {
             "factors": self.table.name,
             "records": list(self.records),
-            "statistics": [vars(each) | {"envelope": each.envelope} for each in self.statistics],
+            "statistics": [vars(statistic) | {"envelope": statistic.envelope} for statistic in self.statistics],
             "left_out": self.left_out,
             "exceeded": [{"record": r, "case": c, "verdict": text} for (r, c), text in self.exceeded.items()],
             "failures": [{"record": r, "case": c, "message": text} for (r, c), text in self.failures.items()],
@@ -181,9 +181,9 @@ def _quantities(scene: AnyScene) -> tuple[dict[str, Source], dict[str, str]]:
         names = {
             "floors": [node.name for node in scene.building.nodes],
             "storeys": [column.name for column in scene.building.columns],
-            "bearings": [each.name or f"bearing {number}" for number, each in enumerate(scene.bearings, 1)],
+            "bearings": [bearing.name or f"bearing {number}" for number, bearing in enumerate(scene.bearings, 1)],
         }
-    sources = {name: each for name, each in catalogue(Counts.of(scene)).items() if each.quantity.governs}
+    sources = {name: source for name, source in catalogue(Counts.of(scene)).items() if source.quantity.governs}
     parts = {}
     for name, source in sources.items():
         labels = names.get(source.quantity.path.partition(".*")[0])
@@ -194,7 +194,7 @@ def _quantities(scene: AnyScene) -> tuple[dict[str, Source], dict[str, str]]:
 
 def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
     """Tables of the statistics of the whole, of what has none, and of runs that failed; parts: `write_statistics`."""
-    rows = [_cells(each) for each in bounds.statistics if not each.part]
+    rows = [_cells(statistic) for statistic in bounds.statistics if not statistic.part]
     columns = ("", *(f"mean {case}" for case in CASES), *(f"worst {case}" for case in CASES), "governs", "worst record")
     reasons = [(_label(name, bounds.parts[name]), why) for name, why in bounds.left_out.items()]
     exceeded = [(f"{record}, {case}", verdict) for (record, case), verdict in bounds.exceeded.items()]
@@ -213,10 +213,10 @@ def _label(name: str, part: str) -> str:
     return stem.replace("_", " ") + (f" of {part}" if part else "")
 
 
-def _cells(each: Statistic) -> tuple[str, ...]:
-    unit, scale = shown_as(each.unit)
-    numbers = (f"{value * scale:.4g}" for value in (*each.means, *each.worst))
-    return (f"{_label(each.name, each.part)} [{unit}]", *numbers, each.governs, each.record)
+def _cells(statistic: Statistic) -> tuple[str, ...]:
+    unit, scale = shown_as(statistic.unit)
+    numbers = (f"{value * scale:.4g}" for value in (*statistic.means, *statistic.worst))
+    return (f"{_label(statistic.name, statistic.part)} [{unit}]", *numbers, statistic.governs, statistic.record)
 
 
 def write_statistics(bounds: SuiteBounds, path: str | Path) -> Path:
@@ -226,15 +226,15 @@ def write_statistics(bounds: SuiteBounds, path: str | Path) -> Path:
     """
     rows = bounds.statistics
     columns: dict[tuple[str, str], list[Any]] = {
-        ("quantity", ""): [_label(each.name, each.part) for each in rows],
-        ("of", ""): [each.part for each in rows],
-        ("unit", ""): [each.unit or "1" for each in rows],
-        **{(f"mean {case}", ""): [each.means[i] for each in rows] for i, case in enumerate(CASES)},
-        **{(f"worst {case}", ""): [each.worst[i] for each in rows] for i, case in enumerate(CASES)},
-        ("envelope of means", ""): [each.envelope[0] for each in rows],
-        ("envelope of worst", ""): [each.envelope[1] for each in rows],
-        ("governs", ""): [each.governs for each in rows],
-        ("worst record", ""): [each.record for each in rows],
+        ("quantity", ""): [_label(row.name, row.part) for row in rows],
+        ("of", ""): [row.part for row in rows],
+        ("unit", ""): [row.unit or "1" for row in rows],
+        **{(f"mean {case}", ""): [row.means[i] for row in rows] for i, case in enumerate(CASES)},
+        **{(f"worst {case}", ""): [row.worst[i] for row in rows] for i, case in enumerate(CASES)},
+        ("envelope of means", ""): [row.envelope[0] for row in rows],
+        ("envelope of worst", ""): [row.envelope[1] for row in rows],
+        ("governs", ""): [row.governs for row in rows],
+        ("worst record", ""): [row.record for row in rows],
     }
     return write_columns(check_output(path, (".csv",)), columns)
 

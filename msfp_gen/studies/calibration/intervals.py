@@ -80,7 +80,7 @@ def _noise(sums: Array, basis: Array, least: float = 0.0) -> Noise:
     taper = 2 * (1 - np.arange(rows) / rows)
     taper[0] = 1.0
     repeats, correlation = max(
-        ((float(taper @ each), each) for each in (first, _by_akaike(lags, rows))), key=lambda p: p[0]
+        ((float(taper @ candidate), candidate) for candidate in (first, _by_akaike(lags, rows))), key=lambda p: p[0]
     )
     own = 1 - float(np.sum(basis**2)) / rows
     return Noise(max(float(sums[0]), least) / rows, correlation, max(rows / max(repeats, 1.0) * own, 1.0))
@@ -185,14 +185,14 @@ def spread_of(known: Identified, noises: Sequence[Noise]) -> Spread:
 
     bases = _split(known.basis, noises)
     inner = [basis.T @ noise.covariance_times(basis) for basis, noise in zip(bases, noises, strict=True)]
-    parts = np.array([known.factors @ each @ known.factors.T for each in inner])
+    parts = np.array([known.factors @ matrix @ known.factors.T for matrix in inner])
     covariance, variances = parts.sum(axis=0), np.einsum("tkk->tk", parts)
     covariance[known.undetermined, known.undetermined] = np.inf
     deviation = np.sqrt(np.diag(covariance))
     freedom = np.ones(len(deviation))
     some = np.isfinite(deviation) & (deviation > 0)
-    each = variances[:, some] ** 2 / np.array([[noise.freedom] for noise in noises])
-    freedom[some] = np.maximum(deviation[some] ** 4 / each.sum(axis=0), 1.0)
+    squares = variances[:, some] ** 2 / np.array([[noise.freedom] for noise in noises])
+    freedom[some] = np.maximum(deviation[some] ** 4 / squares.sum(axis=0), 1.0)
     return Spread(deviation, t.ppf(0.5 + CONFIDENCE / 2, freedom) * deviation, _correlation(covariance))
 
 

@@ -75,7 +75,9 @@ def unknowns_of(
     for path in map(_whole, paths):
         parts = path.split("=")
         members = [parameters_of(scene, [part], "parameters") for part in parts]
-        groups = [(each,) for each in members[0]] if len(parts) == 1 else [tuple(p for m in members for p in m)]
+        groups = (
+            [(parameter,) for parameter in members[0]] if len(parts) == 1 else [tuple(p for m in members for p in m)]
+        )
         limits = rest.pop(path, None)
         for group in groups:
             name = "=".join(parameter.path for parameter in group)
@@ -233,7 +235,7 @@ class Residuals:
         size, forces, residuals, blocks = len(self.unknowns), [], [], []
         for index, (test, run) in enumerate(zip(self.tests, self._runs(values[:size], jacobian is None), strict=True)):
             if isinstance(run, RunError | InputError):
-                rows = sum(len(each.time) for each in self.tests)
+                rows = sum(len(other.time) for other in self.tests)
                 return Evaluation(np.full(rows, FAILED), np.zeros((rows, len(values))), (), run)
             force, slopes = run
             shift = np.zeros((len(force), self.offsets))

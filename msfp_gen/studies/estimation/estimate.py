@@ -144,16 +144,16 @@ class Estimate:
         return asdict(self)
 
 
-def question_of(study: Study, **given: Any) -> Question:
+def question_of(study: Study, **changes: Any) -> Question:
     """The question of `[accuracy]` in a study file, with what is given in place of it. Raises InputError."""
     table = {key: value for key, value in study.table.get("accuracy", {}).items() if key != "listed"}
     known = [name for name in Question.__dataclass_fields__ if name != "logarithmic"]
     if unknown := [key for key in table if key not in known]:
         raise InputError(f"accuracy.{unknown[0]}: no such key; the keys are {', '.join(known)}")
     goals = ("target", "budget")
-    if any(given.get(name) is not None for name in goals):
+    if any(changes.get(name) is not None for name in goals):
         table = {key: value for key, value in table.items() if key not in goals}
-    table |= {key: value for key, value in given.items() if value is not None}
+    table |= {key: value for key, value in changes.items() if value is not None}
     for name, unit in (("target", ""), ("budget", "s"), ("threshold", "")):
         if isinstance(table.get(name), str):
             try:
@@ -242,12 +242,12 @@ def estimate(
                 unit = units[question.quantity]
                 unit = {"probability": "", "variance": f"({unit})^2" if unit else ""}.get(question.statistic, unit)
                 return replace(estimated(runs, question), unit=unit)
-            found = fragility_of(runs, question, scales, lambda draws: np.log(runs.draws.intensity(draws)))
+            estimate = fragility_of(runs, question, scales, lambda draws: np.log(runs.draws.intensity(draws)))
     except _BudgetError:
         if not begun:
             rmtree(folder, ignore_errors=True)
         raise
-    return replace(found, unit=names)
+    return replace(estimate, unit=names)
 
 
 def _levels(study: Study, question: Question) -> tuple[str, ...]:
@@ -541,18 +541,18 @@ def fragility_of(source: Source, question: Question, scales: Array, intensity: A
     exact model begin where the cheapest one crosses.
     """
     searches = _Searches(source, question, scales, intensity)
-    found, levels, pilot = _estimated(searches, replace(question, statistic="mean", threshold=None, logarithmic=True))
+    mean, levels, pilot = _estimated(searches, replace(question, statistic="mean", threshold=None, logarithmic=True))
     spread = variance_of(levels, pilot, source.population)
-    notes = list(found.notes)
+    notes = list(mean.notes)
     if searches.beyond:
         notes.append(f"{searches.beyond} draws cross outside records.scales; they count half a step beyond: give more")
     _, runs = source.spent()
     costs = {level: source.cost(level) for level in runs}
-    plain = found.plain_seconds * costs[EXACT] * len(scales) / searches.cost(EXACT)  # which runs every scale
+    plain = mean.plain_seconds * costs[EXACT] * len(scales) / searches.cost(EXACT)  # which runs every scale
     dispersions = [float(np.sqrt(max(spread.value + sign * spread.half, 0.0))) for sign in (-1, 0, 1)]
     return replace(
-        found, statistic="fragility", threshold=question.threshold, value=float(np.exp(found.value)),
-        interval=(float(np.exp(found.interval[0])), float(np.exp(found.interval[1]))), dispersion=dispersions[1],
+        mean, statistic="fragility", threshold=question.threshold, value=float(np.exp(mean.value)),
+        interval=(float(np.exp(mean.interval[0])), float(np.exp(mean.interval[1]))), dispersion=dispersions[1],
         dispersion_interval=(dispersions[0], dispersions[2]), notes=tuple(notes), runs=runs, costs=costs,
         plain_seconds=plain,
     )  # fmt: skip
@@ -575,10 +575,10 @@ class _Searches:
         known = self._values[level]
         new = np.array([draw for draw in draws.tolist() if draw not in known], dtype=np.intp)
         if new.size:
-            found = crossings(self.source, level, new, self.scales, self.threshold, self._guess(level, new))
-            self._runs[level] += found.runs
-            self.beyond += found.beyond if level == EXACT else 0
-            known.update(zip(new.tolist(), found.logarithms.tolist(), strict=True))
+            searches = crossings(self.source, level, new, self.scales, self.threshold, self._guess(level, new))
+            self._runs[level] += searches.runs
+            self.beyond += searches.beyond if level == EXACT else 0
+            known.update(zip(new.tolist(), searches.logarithms.tolist(), strict=True))
         logs = np.array([known[draw] for draw in draws.tolist()])
         return logs + self.intensity(draws), np.zeros(len(draws), dtype=bool)
 

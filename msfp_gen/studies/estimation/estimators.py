@@ -289,8 +289,8 @@ def _freedom(contributions: Array, groups: Sequence[slice]) -> float:
     """
     parts = [contributions[group] for group in groups]
     deviations = [(part - part.mean()) ** 2 for part in parts if len(part) > 1]
-    own = sum(float(((each - each.mean()) ** 2).sum()) for each in deviations)
-    return 2 * float(sum(each.sum() for each in deviations)) ** 2 / own if own > 0 else np.inf
+    own = sum(float(((squares - squares.mean()) ** 2).sum()) for squares in deviations)
+    return 2 * float(sum(squares.sum() for squares in deviations)) ** 2 / own if own > 0 else np.inf
 
 
 def exceeding(levels: Sequence[Runs], threshold: float, pilot: int, population: int | None = None) -> Moment:
@@ -326,13 +326,13 @@ def quantile_of(
             return ends[0]
         if above(ends[1]).value >= probability:
             return ends[1]
-        found = brentq(lambda at: above(at).value - probability, *ends, xtol=1e-4 * (ends[1] - ends[0]))
-        return float(found)
+        root = brentq(lambda at: above(at).value - probability, *ends, xtol=1e-4 * (ends[1] - ends[0]))
+        return float(root)
 
-    found = place(1 - share)
-    moment = above(found)
+    quantile = place(1 - share)
+    moment = above(quantile)
     low, high = (place(float(np.clip(1 - share + sign * moment.half, 0.0, 1.0))) for sign in (1, -1))
-    return found, (low, high), moment
+    return quantile, (low, high), moment
 
 
 def uncertainty(x: Array, values: Array, threshold: float | None, at: Array) -> Array:

@@ -98,7 +98,7 @@ def _change(table: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
         return "free", ()
     value = table[changes[0]]
     paths = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, list) else ()
-    if not paths or not all(isinstance(each, str) and all(each.split(".")) for each in paths):
+    if not paths or not all(isinstance(path, str) and all(path.split(".")) for path in paths):
         raise InputError(f"{changes[0]} = {value!r}: give a field of the scene in quotes, such as 'bearing.friction'")
     return changes[0], paths
 
@@ -156,7 +156,7 @@ def _range(table: Mapping[str, Any]) -> list[float]:
     value, points, spacing = table["range"], table.get("points"), table.get("spacing", "linear")
     if not isinstance(value, list) or len(value) != 2:
         raise InputError(f"range = {value!r}: give the first and the last value")
-    low, high = (number_of({"range": each}, "range") for each in value)
+    low, high = (number_of({"range": end}, "range") for end in value)
     if type(points) is not int or not 2 <= points <= MOST_VALUES:
         raise InputError(f"points = {points!r}: give a whole number of values, 2 or more")
     if spacing not in SPACINGS or (spacing == "log" and not 0 < low < high):
@@ -164,7 +164,7 @@ def _range(table: Mapping[str, Any]) -> list[float]:
     if not low < high:
         raise InputError(f"range = {value!r}: give two numbers, the smaller first")
     spaced = np.linspace(low, high, points) if spacing == "linear" else np.geomspace(low, high, points)
-    return [float(each) for each in spaced]
+    return [float(number) for number in spaced]
 
 
 def _label(value: Any) -> Any:
@@ -244,7 +244,7 @@ class SceneFactory:
         chosen = list(zip(axes, values, strict=True))
         for axis, value in chosen:
             if axis.change == "record":
-                scale = next((each for axis, each in chosen if axis.change == "scale"), 1.0)
+                scale = next((number for axis, number in chosen if axis.change == "scale"), 1.0)
                 table = {**table, "motion": motion_of(self._scaled(value, scale))}
             for path in axis.paths if axis.change == "multiplies" else ():
                 table = multiplied_table(table, path, value, axis.surfaces)

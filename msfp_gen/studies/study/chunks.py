@@ -82,18 +82,18 @@ class Chunks:
         for index, axis in enumerate(study.axes):
             if axis.values is None:
                 continue
-            each = [
+            contents = [
                 (study.recipe.records[value] if axis.change == "record" else value, label, study.opened.get((index, k)))
                 for k, (value, label) in enumerate(zip(axis.values, axis.labels, strict=True))
             ]
-            digests = [bytes.fromhex(fingerprint(value, study.files))[:16] for value in each]
+            digests = [bytes.fromhex(fingerprint(value, study.files))[:16] for value in contents]
             digests_of_axes.append(np.array(digests, dtype="V16"))
         return digests_of_axes
 
     @cached_property
     def identity(self) -> str:
         """Digest of everything that any row of the study depends on; that of what workers keep for it."""
-        return fingerprint((self.digest, [each.tobytes() for each in self._digests]))
+        return fingerprint((self.digest, [digests.tobytes() for digests in self._digests]))
 
     def open(self) -> None:
         """Write `study.toml`; parts of a last, shorter chunk that the study has outgrown are removed.

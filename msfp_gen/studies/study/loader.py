@@ -190,7 +190,7 @@ def _study(table: Table, folder: Path | None, progress: Progress | None) -> Stud
 def _checked(table: Table, folder: Path | None, progress: Progress | None) -> Study:
     scene = _scene(table["scene"], folder)
     records = records_from(table.get("records"), folder, progress)
-    own = [_axis(name, each, folder) for name, each in _table(table, "axes").items()]
+    own = [_axis(name, axis, folder) for name, axis in _table(table, "axes").items()]
     axes = (*records.axes, *own)
     if len({axis.name for axis in axes}) < len(axes):
         raise InputError("axes: [records] makes the axes record and scale; give other names")

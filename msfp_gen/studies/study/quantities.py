@@ -121,12 +121,12 @@ class Keep:
 def _columns(keep: Keep) -> tuple[Column, ...]:
     known, columns = keep.known, []
     for name in keep.names:
-        each = [key for key in known if key == name or re.fullmatch(rf"{re.escape(name)}_\d+", key)]
-        if not each:
+        columns_of_name = [key for key in known if key == name or re.fullmatch(rf"{re.escape(name)}_\d+", key)]
+        if not columns_of_name:
             words = sorted({re.sub(r"_\d+$", "", key) for key in known})
             hint = suggestion(name, words) or f"; the quantities are {', '.join(words)}"
             raise InputError(f"keep: {name!r} is no quantity{hint}")
-        columns += [Column(key, known[key].quantity.unit, key in TEXTS) for key in each]
+        columns += [Column(key, known[key].quantity.unit, key in TEXTS) for key in columns_of_name]
     for name, text in keep.formulas:
         _tree(keep, name, text)
         columns.append(Column(name, ""))
