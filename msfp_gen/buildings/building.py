@@ -57,9 +57,9 @@ class Building:
         require_type(base, BaseSlab, "base")
         for index, storey in enumerate(storeys):
             require_type(storey, Storey, f"storeys[{index}]")
-        made = frame(base, storeys)
-        damping = _damping(made.mass, made.stiffness, made.nodes, damping_ratio, rayleigh_frequencies)
-        return cls(made.mass, damping, made.stiffness, made.nodes, made.columns)._checked()
+        building = frame(base, storeys)
+        damping = _damping(building.mass, building.stiffness, building.nodes, damping_ratio, rayleigh_frequencies)
+        return cls(building.mass, damping, building.stiffness, building.nodes, building.columns)._checked()
 
     @classmethod
     def from_matrices(
@@ -86,7 +86,7 @@ class Building:
                 raise InputError(f"building.{name} has {len(matrix)} rows: building.mass has {len(m)}; give as many")
         for name, matrix in (("mass", m), ("stiffness", k)):
             check_semidefinite(matrix, name)
-        points = tuple(_node(name, *given, len(m)) for name, given in nodes.items())
+        points = tuple(_node(name, *place, len(m)) for name, place in nodes.items())
         if c is None:
             c = _damping(m, k, points, damping_ratio, rayleigh_frequencies)
         return cls(m, c, k, points)._checked()
@@ -141,8 +141,10 @@ class Building:
         modes[fixed.inner] = fixed.modes[:, kept]
         basis = np.hstack([self._static(fixed), modes])
         nodes = tuple(Node(node.name, node.position, node.rows @ basis, node.carries) for node in self.nodes)
-        columns = tuple(Columns(each.name, each.deformation @ basis, each.inertia @ basis) for each in self.columns)
-        mass, damping, stiffness = (_congruent(each, basis) for each in (self.mass, self.damping, self.stiffness))
+        columns = tuple(
+            Columns(storey.name, storey.deformation @ basis, storey.inertia @ basis) for storey in self.columns
+        )
+        mass, damping, stiffness = (_congruent(matrix, basis) for matrix in (self.mass, self.damping, self.stiffness))
         return Building(mass, damping, stiffness, nodes, columns)
 
     def _checked(self) -> Building:
@@ -250,11 +252,11 @@ def modal_damping(mass: Array, fixed: FixedBase, ratios: Array) -> Array:
     ratios: from the lowest mode, shape (k,); the last is that of all higher ones.
     """
     count = len(fixed.frequencies)
-    each = np.concatenate([ratios, np.full(max(count - len(ratios), 0), ratios[-1])])[:count]
+    of_modes = np.concatenate([ratios, np.full(max(count - len(ratios), 0), ratios[-1])])[:count]
     inner = np.ix_(fixed.inner, fixed.inner)
     rows = fixed.modes.T @ mass[inner] @ fixed.relative
-    found: Array = rows.T * (2 * each * fixed.frequencies) @ rows
-    return found
+    damping: Array = rows.T * (2 * of_modes * fixed.frequencies) @ rows
+    return damping
 
 
 def rayleigh_damping(
@@ -267,8 +269,8 @@ def rayleigh_damping(
     low, high = (2 * np.pi * frequency for frequency in frequencies)
     a, b = 2 * ratio * low * high / (low + high), 2 * ratio / (low + high)
     rows = fixed.relative
-    found: Array = a * rows.T @ mass[np.ix_(fixed.inner, fixed.inner)] @ rows + b * stiffness
-    return found
+    damping: Array = a * rows.T @ mass[np.ix_(fixed.inner, fixed.inner)] @ rows + b * stiffness
+    return damping
 
 
 MOST = 5000  # coordinates of a building, whose matrices are dense
@@ -287,22 +289,22 @@ def matrix_of(source: Matrix, name: str) -> Array:
     path = f"building.{name}"
     values = _read(Path(source), path, name) if isinstance(source, str | PathLike) else source
     try:
-        found = np.array(values.toarray() if hasattr(values, "toarray") else values, dtype=float)
+        matrix = np.array(values.toarray() if hasattr(values, "toarray") else values, dtype=float)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{path}: these are no numbers; give a square array or the path of a file") from None
-    if found.ndim != 2 or found.shape[0] != found.shape[1] or not 0 < len(found) <= MOST:
-        raise InputError(f"{path} has the shape {found.shape}: give a square matrix of 1 to {MOST} coordinates")
-    if not np.all(np.isfinite(found)):
-        row, column = np.argwhere(~np.isfinite(found))[0]
-        raise InputError(f"{path}[{row}, {column}] = {found[row, column]}: give finite numbers")
-    difference = np.abs(found - found.T)
-    if difference.max() > SYMMETRY * np.abs(found).max():
-        row, column = np.unravel_index(int(difference.argmax()), found.shape)
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not 0 < len(matrix) <= MOST:
+        raise InputError(f"{path} has the shape {matrix.shape}: give a square matrix of 1 to {MOST} coordinates")
+    if not np.all(np.isfinite(matrix)):
+        row, column = np.argwhere(~np.isfinite(matrix))[0]
+        raise InputError(f"{path}[{row}, {column}] = {matrix[row, column]}: give finite numbers")
+    difference = np.abs(matrix - matrix.T)
+    if difference.max() > SYMMETRY * np.abs(matrix).max():
+        row, column = np.unravel_index(int(difference.argmax()), matrix.shape)
         raise InputError(
-            f"{path}[{row}, {column}] = {found[row, column]:.9g} and [{column}, {row}] = {found[column, row]:.9g}: "
+            f"{path}[{row}, {column}] = {matrix[row, column]:.9g} and [{column}, {row}] = {matrix[column, row]:.9g}: "
             "give a symmetric matrix"
         )
-    average: Array = (found + found.T) / 2
+    average: Array = (matrix + matrix.T) / 2
     return average
 
 
@@ -333,18 +335,18 @@ def check_semidefinite(matrix: Array, name: str) -> None:
 
 def boundary_of(nodes: tuple[Node, ...]) -> tuple[int, ...]:
     """Coordinates on which the nodes that carry bearings depend. Raises InputError where two share one."""
-    found: list[int] = []
+    boundary: list[int] = []
     for node in nodes:
         if node.carries:
             own = np.flatnonzero(np.any(node.rows, axis=0)).tolist()
-            if shared := set(own) & set(found):
+            if shared := set(own) & set(boundary):
                 raise InputError(f"building.nodes[{node.name!r}]: coordinate {min(shared)} is that of another node")
             if len(own) != FREEDOMS or np.linalg.matrix_rank(node.rows[:, own]) < FREEDOMS:
                 raise InputError(f"building.nodes[{node.name!r}] depends on {own}: give six different coordinates")
-            found += own
-    if not found:
+            boundary += own
+    if not boundary:
         raise InputError("building.nodes: none carries bearings; give at least one with its six coordinates")
-    return tuple(sorted(found))
+    return tuple(sorted(boundary))
 
 
 def rigid_motions(nodes: tuple[Node, ...], follow: Array, boundary: tuple[int, ...]) -> Array:

@@ -59,16 +59,16 @@ class Change:
     @classmethod
     def of_table(cls, table: dict[str, Any]) -> Change:
         """The inverse of `table`."""
-        return cls(**{**table, "notes": tuple(Note(**each) for each in table["notes"])})
+        return cls(**{**table, "notes": tuple(Note(**note) for note in table["notes"])})
 
 
 def earlier_work(changes: Sequence[Change], bearing: int, shape: tuple[int, ...]) -> Array:
     """Integrals of the powers of a bearing before its model of a row began, shape (rows, integrals) [J]."""
-    found = np.zeros(shape)
+    work = np.zeros(shape)
     for change in changes:
         if change.bearing == bearing:
-            found[change.rows :] = change.work
-    return found
+            work[change.rows :] = change.work
+    return work
 
 
 OF_SURFACES = ("normal", "sliding", "rim", "compression", "temperature")  # of a row; not every model has the last two
@@ -100,13 +100,13 @@ class Member:
     @classmethod
     def of(cls, scene: BuildingScene, index: int, effects: Effects) -> Self:
         """A bearing of a building at rest, from 0, with a model of these effects. Raises InputError."""
-        given, load, solver = scene.bearings[index], float(scene.axial_loads[index]), scene.solver
-        asked = Asked(Auto() if given.effects is None else given.effects, solver, scene.end)
+        mount, load, solver = scene.bearings[index], float(scene.axial_loads[index]), scene.solver
+        asked = Asked(Auto() if mount.effects is None else mount.effects, solver, scene.end)
         try:
-            rest = scene_at_rest(given.bearing, given.interface, load, effects, solver)
+            rest = scene_at_rest(mount.bearing, mount.interface, load, effects, solver)
         except InputError as error:
             raise InputError(f"scene.bearings[{index}]: {error}") from None
-        model = build_model(given.bearing.layout, rest.modelled)
+        model = build_model(mount.bearing.layout, rest.modelled)
         stops = stopping_monitors(asked, effects, strict=False)
         options = monitor_options(rest, effects, scene.effect_selections[index], stops, noted=("uplift",))
         return cls(asked, effects, rest, model, compiled_port(rest, model, load, **options))
@@ -139,8 +139,8 @@ class Member:
     @property
     def work(self) -> Array:
         """Integrals of its powers since its model began, at the committed state, shape (works,), [J]."""
-        found: Array = self.model.unpack(self.port.row)["work"]
-        return found
+        work: Array = self.model.unpack(self.port.row)["work"]
+        return work
 
     def ending(self, status: str, surface: int = 0, value: float = 0.0) -> Ending:
         """How it ended with its model."""
@@ -285,9 +285,9 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
     members = [Member.of(scene, index, effects) for index, effects in enumerate(scene.modelled)]
     grounds, ground_of = scene.grounds
     building, solver = scene.building, scene.solver
-    grid = TimeGrid.of_histories(grounds, scene.end, (solver.max_step, *(each.max_step for each in grounds)))
+    grid = TimeGrid.of_histories(grounds, scene.end, (solver.max_step, *(ground.max_step for ground in grounds)))
     attached = np.flatnonzero(np.any(scene.attachments, axis=(0, 1)))
-    pieces = [snapped(each.knots, each.coefficients, grid.stops) for each in grounds]
+    pieces = [snapped(ground.knots, ground.coefficients, grid.stops) for ground in grounds]
     module, key = load_driver("msfp_gen.buildings")
     run: Run = module.Run(
         (building.mass, building.damping, building.stiffness),
@@ -376,15 +376,15 @@ def _stored(run: BuildingRun, rows: dict[str, Array], index: int) -> Array:
     upper, interface = rows[f"wrench {index}"][:, 1], run.scene.bearings[index].interface
     stiffness = [interface.stiffness, interface.stiffness, interface.vertical_stiffness]
     stiffness += 2 * [interface.rotational_stiffness]
-    found: Array = 0.5 * (upper[:, :5] ** 2 / stiffness).sum(axis=1)
+    energy: Array = 0.5 * (upper[:, :5] ** 2 / stiffness).sum(axis=1)
     for name in ("kinetic", "potential", "rim_stored", "seat_stored"):
-        found = found + rows[f"{name} {index}"]
-    return found
+        energy = energy + rows[f"{name} {index}"]
+    return energy
 
 
-def _threads(given: int | None, bearings: int) -> int:
-    if given is None:
+def _threads(threads: int | None, bearings: int) -> int:
+    if threads is None:
         return max(1, min(usable_cores(), bearings // BEARINGS_OF_A_THREAD))
-    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
-        raise InputError(f"threads = {given!r}: give a whole number of at least 1")
-    return given
+    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise InputError(f"threads = {threads!r}: give a whole number of at least 1")
+    return threads

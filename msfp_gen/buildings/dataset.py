@@ -100,8 +100,8 @@ def ground_name(index: int) -> str:
 def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -> BuildingScene:
     """The inverse of `scene_text`, with the arrays of `to_arrays` and all motions of the ground. Raises InputError."""
     table = toml_table(text)
-    given = zip(table.get("node", []), arrays["node_position"], arrays["node_rows"], strict=True)
-    nodes = tuple(Node(str(row["name"]), place, rows, bool(row["carries"])) for row, place, rows in given)
+    stated_nodes = zip(table.get("node", []), arrays["node_position"], arrays["node_rows"], strict=True)
+    nodes = tuple(Node(str(row["name"]), place, rows, bool(row["carries"])) for row, place, rows in stated_nodes)
     stated = zip(table.get("column", []), arrays["deformation"], arrays["inertia"], strict=True)
     columns = tuple(Columns(str(row["name"]), *both) for row, *both in stated)
     building = Building(arrays["mass"], arrays["damping"], arrays["stiffness"], nodes, columns)
@@ -228,8 +228,8 @@ def to_dataset(result: Any) -> xr.Dataset:
 
 def dataset_of_one(one: Any) -> xr.Dataset:
     """The rows of a bearing of a building, for other programs; their names are those of a bearing alone."""
-    given = one.scene.bearings[one.index]
-    parts = {"bearing": bearing_table(given.bearing), "interface": plain_table(given.interface)}
+    mount = one.scene.bearings[one.index]
+    parts = {"bearing": bearing_table(mount.bearing), "interface": plain_table(mount.interface)}
     text = dumps({"axial_load": one.axial_load, **parts})
     return dataset_of_bearing(one, attributes_of(one, "", text, one.notes, {}) | {"bearing": one.label})
 

@@ -118,14 +118,14 @@ def bearing_table(scene: BuildingScene) -> Table:
     rows = [
         (
             str(index + 1),
-            each.name or "-",
-            each.bearing.layout.name,
+            mount.name or "-",
+            mount.bearing.layout.name,
             kind_of[index],
-            each.node,
+            mount.node,
             *(f"{x:.4g}" for x in scene.places[index]),
             f"{load * 1e-3:.4g}",
         )
-        for index, (each, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True))
+        for index, (mount, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True))
     ]
     columns = ("no.", "name", "layout", "kind", "node", "x [m]", "y [m]", "N at rest [kN]")
     return Table(f"{len(rows)} bearings", columns, rows)
@@ -170,9 +170,9 @@ def _interfaces(scene: BuildingScene) -> Iterator[Table]:
 
 def _doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
     """Doubts about the interfaces; those of bearings stand with their kinds."""
-    for index, (each, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True)):
-        given, needed, _ = standing_below(each, load)
-        yield from unsteady(f"{scene.label(index)}: interface.rotational_stiffness", given, needed)
+    for index, (mount, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True)):
+        stiffness, needed, _ = standing_below(mount, load)
+        yield from unsteady(f"{scene.label(index)}: interface.rotational_stiffness", stiffness, needed)
     yield from building_doubts(scene)
 
 

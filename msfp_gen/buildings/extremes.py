@@ -185,16 +185,16 @@ def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:
     def turned(row: Array) -> Array:
         return np.vstack([about[:2], row])
 
-    found = [(2, node.rows[:3], still) for node in building.nodes]
-    found += [(0, node.rows[:3], common) for node in building.nodes]
-    found += [(0, each.deformation[:3], still) for each in building.columns]
-    found += [(2, each.inertia[:3], still) for each in building.columns]
-    found += [(2, turned(each.inertia[5]), still) for each in building.columns]
-    found.append((0, turned(building.node(scene.bearings[0].node).rows[5]), still))
-    found.append((0, scene.attachments[:, :3].mean(axis=0), mean))
-    found.append((2, np.vstack([overturning(scene), about[:1]]), still))
-    found += [(0, rows, still) for rows in corners(scene).reshape(-1, 3, size)]
-    orders, rows, shares = zip(*found, strict=True)
+    entries = [(2, node.rows[:3], still) for node in building.nodes]
+    entries += [(0, node.rows[:3], common) for node in building.nodes]
+    entries += [(0, columns.deformation[:3], still) for columns in building.columns]
+    entries += [(2, columns.inertia[:3], still) for columns in building.columns]
+    entries += [(2, turned(columns.inertia[5]), still) for columns in building.columns]
+    entries.append((0, turned(building.node(scene.bearings[0].node).rows[5]), still))
+    entries.append((0, scene.attachments[:, :3].mean(axis=0), mean))
+    entries.append((2, np.vstack([overturning(scene), about[:1]]), still))
+    entries += [(0, rows, still) for rows in corners(scene).reshape(-1, 3, size)]
+    orders, rows, shares = zip(*entries, strict=True)
     return list(orders), np.stack(rows), np.stack(shares)
 
 

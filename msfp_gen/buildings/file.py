@@ -106,57 +106,57 @@ def building_from_table(
     frame, named = parts.pop("building"), parts.pop("bearings", {})
     parts["building"] = _building(frame, folder)
     common = {name: frame[name] for name in COMMON if name in frame}
-    made: dict[str, Bearing] = {}
+    bearings: dict[str, Bearing] = {}
     rows = enumerate(frame["bearing"])
     parts["bearings"] = [
-        _bearing({**common, **row}, f"building.bearing[{index}]", named, folder, made) for index, row in rows
+        _bearing({**common, **row}, f"building.bearing[{index}]", named, folder, bearings) for index, row in rows
     ]
     word = parts.pop("fidelity", "exact")
     return building_at_fidelity(BuildingScene(**parts), word)
 
 
-def _building(given: Table, folder: Path | None) -> Building:
+def _building(table: Table, folder: Path | None) -> Building:
     """The building, made once for each frame and contents of its matrices, as long as it is among the last ones."""
-    frame = {name: value for name, value in given.items() if name not in (*COMMON, "bearing")}
+    frame = {name: value for name, value in table.items() if name not in (*COMMON, "bearing")}
     named = [name for name in MATRICES if name in frame]
     frame |= {name: resolved(frame[name], folder, f"building.{name}") for name in named}
     with suppress(OSError):  # a file that cannot be read is an error of its reader
         files = {str(frame[name]): digest_of(Path(frame[name])) for name in named}
         with expecting(files):
-            return _buildings.value(fingerprint((frame, files)), lambda: _made(frame, named))
-    return _made(frame, named)
+            return _buildings.value(fingerprint((frame, files)), lambda: _of_table(frame, named))
+    return _of_table(frame, named)
 
 
-def _made(given: Table, files: list[str]) -> Building:
-    options: Table = {name: given[name] for name in ("damping_ratio", "rayleigh_frequencies") if name in given}
-    frames = [name for name in ("base", "storey") if given.get(name)]
+def _of_table(table: Table, files: list[str]) -> Building:
+    options: Table = {name: table[name] for name in ("damping_ratio", "rayleigh_frequencies") if name in table}
+    frames = [name for name in ("base", "storey") if table.get(name)]
     if files and frames:
         raise InputError(f"building.{frames[0]}: not together with building.{files[0]}; give a frame or its matrices")
-    building = _of_matrices(given, options) if files else _of_storeys(given, options)
-    return building.reduced(given["highest_frequency"]) if "highest_frequency" in given else building
+    building = _of_matrices(table, options) if files else _of_storeys(table, options)
+    return building.reduced(table["highest_frequency"]) if "highest_frequency" in table else building
 
 
-def _of_storeys(given: Table, options: Table) -> Building:
-    if "base" not in given:
+def _of_storeys(table: Table, options: Table) -> Building:
+    if "base" not in table:
         raise InputError("building.base is missing: give this table, or mass and stiffness as files of matrices")
-    if given.get("node"):
+    if table.get("node"):
         raise InputError("building.node: a frame of storeys makes its nodes; leave it out")
     with errors_at("base", "building.base"):
-        base = BaseSlab(**given["base"])
+        base = BaseSlab(**table["base"])
     storeys = []
-    for index, row in enumerate(given.get("storey", [])):
+    for index, row in enumerate(table.get("storey", [])):
         with errors_at("storey", f"building.storey[{index}]"):
             storeys.append(Storey(**row))
     return Building.shear(base, storeys, **options)
 
 
-def _of_matrices(given: Table, options: Table) -> Building:
+def _of_matrices(table: Table, options: Table) -> Building:
     for name in MATRICES[:2]:
-        if name not in given:
+        if name not in table:
             raise InputError(f"building.{name} is missing: give the path of a .mtx or .npz file")
-    files = {name: given.get(name) for name in MATRICES}
+    files = {name: table.get(name) for name in MATRICES}
     nodes: dict[str, Any] = {}
-    for index, row in enumerate(given.get("node", [])):
+    for index, row in enumerate(table.get("node", [])):
         if row["name"] in nodes:
             raise InputError(f"building.node[{index}].name = {row['name']!r}: a node has it already; give another")
         nodes[row["name"]] = (row["coordinates"], row["position"])
@@ -169,11 +169,11 @@ def stored_bearing(row: Table, index: int) -> BuildingBearing:
     return _bearing(validate(_BEARING, row), path, {}, None, {})
 
 
-def _bearing(given: Table, path: str, named: Table, folder: Path | None, made: dict[str, Bearing]) -> BuildingBearing:
-    values = dict(given)
+def _bearing(row: Table, path: str, named: Table, folder: Path | None, bearings: dict[str, Bearing]) -> BuildingBearing:
+    values = dict(row)
     if "interface" not in values:
         raise InputError(f"{path}.interface is missing: give this table, or [building.interface] for all bearings")
-    values["bearing"] = _values(values["bearing"], path, named, made)
+    values["bearing"] = _values(values["bearing"], path, named, bearings)
     with errors_at("effects", f"{path}.effects"):
         if "effects" in values:
             values["effects"] = effects_from_table(values["effects"])
@@ -189,19 +189,19 @@ def _bearing(given: Table, path: str, named: Table, folder: Path | None, made: d
         return BuildingBearing(**values)
 
 
-def _values(given: Any, path: str, named: Table, made: dict[str, Bearing]) -> Bearing:
-    """A bearing by its name in `[bearings]`, by that of a preset, or as a table. made: those with a name, so far."""
-    own = isinstance(given, str) and given in named
-    if isinstance(given, str) and given in made:
-        return made[given]
-    place = f"bearings.{given}" if own else f"{path}.bearing"
+def _values(source: Any, path: str, named: Table, bearings: dict[str, Bearing]) -> Bearing:
+    """A bearing by its name in `[bearings]`, by that of a preset, or as a table. bearings: the named ones so far."""
+    own = isinstance(source, str) and source in named
+    if isinstance(source, str) and source in bearings:
+        return bearings[source]
+    place = f"bearings.{source}" if own else f"{path}.bearing"
     try:
-        bearing = bearing_from_table(named[given] if own else given)
+        bearing = bearing_from_table(named[source] if own else source)
     except InputError as error:
-        names = f"; those of [bearings] are {', '.join(named)}" if isinstance(given, str) and not own and named else ""
+        names = f"; those of [bearings] are {', '.join(named)}" if isinstance(source, str) and not own and named else ""
         raise InputError(place + str(error).removeprefix("bearing") + names) from None
-    if isinstance(given, str):
-        made[given] = bearing
+    if isinstance(source, str):
+        bearings[source] = bearing
     return bearing
 
 
@@ -240,9 +240,9 @@ def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> AnyScene:
         raise InputError(f"{path}: {error}") from None
 
 
-def scene_of(table: Mapping[str, Any], folder: Path | None = None, **given: Any) -> AnyScene:
-    """The scene of a plain table, as in a file; folder, given: as in `scene_from_table`. Raises InputError."""
-    return (building_from_table if "building" in table else scene_from_table)(table, folder, **given)
+def scene_of(table: Mapping[str, Any], folder: Path | None = None, **parts: Any) -> AnyScene:
+    """The scene of a plain table, as in a file; folder, parts: as in `scene_from_table`. Raises InputError."""
+    return (building_from_table if "building" in table else scene_from_table)(table, folder, **parts)
 
 
 def reduced(scene: AnyScene, word: str) -> AnyScene:
@@ -254,14 +254,14 @@ def reduced(scene: AnyScene, word: str) -> AnyScene:
 
 def with_absolute_paths(table: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
     """The table of a scene with absolute paths of its files; `folder`: as in `scene_from_table`. Raises InputError."""
-    found = deepcopy(dict(table))
-    for place, inner, names in _with_files(found):
+    absolute = deepcopy(dict(table))
+    for place, inner, names in _with_files(absolute):
         for name in names:
             if name in inner and _are_texts(inner[name]):  # the schema refuses others
                 inner[name] = resolved(inner[name], folder, f"{place}.{name}")
         if isinstance(inner.get("scale_to"), dict):
             inner["scale_to"] = with_spectrum(inner["scale_to"], folder, f"{place}.scale_to")
-    return found
+    return absolute
 
 
 def located_value(path: str, value: Any, folder: Path | None) -> Any:

@@ -48,8 +48,8 @@ def _places(values: Array, shape: tuple[int, int]) -> tuple[Indices, Indices]:
     places = values[:, :2]
     if not np.all((places >= 1) & (places <= shape) & (places == np.floor(places))):
         raise ValueError("an entry is outside the matrix; rows and columns are counted from 1")
-    found = places.astype(np.intp) - 1
-    return found[:, 0], found[:, 1]
+    indices = places.astype(np.intp) - 1
+    return indices[:, 0], indices[:, 1]
 
 
 def _columns(shape: tuple[int, int], symmetry: str) -> tuple[Indices, Indices]:

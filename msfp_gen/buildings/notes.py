@@ -206,8 +206,8 @@ def _undamped(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
     least, interface = int(ratios.argmin()), scene.bearings[0].interface
     if ratios[least] < LEAST_DAMPING:
         missing = 2 * (USUAL_DAMPING - ratios) / (turns * modes.shares[on_springs])  # damping over stiffness [s]
-        given = interface.vertical_damping
-        cure = given + float(missing.max()) * interface.vertical_stiffness
+        damping = interface.vertical_damping
+        cure = damping + float(missing.max()) * interface.vertical_stiffness
         what = "the building vibrates on the vertical springs of its interfaces"
         name = "building.interface.vertical_damping"
-        yield 0, float(ratios[least]), ringing(name, given, what, turns[least], ratios[least], cure)
+        yield 0, float(ratios[least]), ringing(name, damping, what, turns[least], ratios[least], cure)

@@ -68,12 +68,16 @@ class BuildingBearing:
                 )
 
 
-def standing_below(each: BuildingBearing, load: float) -> tuple[float, float, float]:
+def standing_below(mount: BuildingBearing, load: float) -> tuple[float, float, float]:
     """Rotational stiffness of an interface, that which its plate needs, and the load: see `scene/standing.py`.
 
     The building, which holds no plate at its place, follows it sideways.
     """
-    return each.interface.rotational_stiffness, needed_rotational_stiffness(each.bearing, float(load), 0.0), float(load)
+    return (
+        mount.interface.rotational_stiffness,
+        needed_rotational_stiffness(mount.bearing, float(load), 0.0),
+        float(load),
+    )
 
 
 class VerticalModes(NamedTuple):
@@ -117,21 +121,21 @@ class BuildingScene:
         require_type(self.solver, Solver, "scene.solver")
         require_type(self.limits, (Limits, type(None)), "scene.limits")
         object.__setattr__(self, "bearings", tuple(self.bearings))
-        for index, each in enumerate(self.bearings):
-            require_type(each, BuildingBearing, f"scene.bearings[{index}]")
+        for index, mount in enumerate(self.bearings):
+            require_type(mount, BuildingBearing, f"scene.bearings[{index}]")
         if not self.bearings:
             raise InputError("scene.bearings: there are none; give at least one BuildingBearing")
-        for index, each in enumerate(self.bearings):
+        for index, mount in enumerate(self.bearings):
             with errors_at("bearing", f"scene.bearings[{index}].bearing"):
-                check_seats(each.bearing, each.interface, each.effects)
+                check_seats(mount.bearing, mount.interface, mount.effects)
         check_fields(self, "scene")
         self._check_gravity()
         self._check_places()
         self._check_motion()
         if self.solver.method == "dopri5":
             raise InputError("solver.method = 'dopri5': the run of a building is implicit; give 'implicit'")
-        for index, (each, load) in enumerate(zip(self.bearings, self.axial_loads, strict=True)):
-            check_standing(f"scene.bearings[{index}].interface.rotational_stiffness", *standing_below(each, load))
+        for index, (mount, load) in enumerate(zip(self.bearings, self.axial_loads, strict=True)):
+            check_standing(f"scene.bearings[{index}].interface.rotational_stiffness", *standing_below(mount, load))
 
     @property
     def end(self) -> float:
@@ -147,8 +151,8 @@ class BuildingScene:
     def grounds(self) -> tuple[list[Motion], list[int]]:
         """The different motions of the ground, that of the scene first, and the index of that of each bearing."""
         motions, indices = [self.motion], []
-        for each in self.bearings:
-            own = self.motion if each.motion is None else each.motion
+        for mount in self.bearings:
+            own = self.motion if mount.motion is None else mount.motion
             if own not in motions:
                 motions.append(own)
             indices.append(motions.index(own))
@@ -177,7 +181,7 @@ class BuildingScene:
         """Places of the bearings in plan, shape (bearings, 2) [m]."""
         nodes = [self._node(index).position[:2] for index in range(len(self.bearings))]
         pairs = zip(self.bearings, nodes, strict=True)
-        return np.array([node if each.position is None else each.position for each, node in pairs], dtype=float)
+        return np.array([node if mount.position is None else mount.position for mount, node in pairs], dtype=float)
 
     def label(self, index: int) -> str:
         """What messages call a bearing."""
@@ -201,7 +205,7 @@ class BuildingScene:
         Raises InputError: the weights are not balanced, or a bearing would be in tension.
         """
         rows = self.attachments[:, 2]
-        springs = np.array([each.interface.vertical_stiffness for each in self.bearings])
+        springs = np.array([mount.interface.vertical_stiffness for mount in self.bearings])
         stiffness = self.building.stiffness + rows.T * springs @ rows
         # Horizontal motions meet no spring: the least of all solutions. Rounding is relative to each coordinate.
         scale = 1 / np.sqrt(np.maximum(np.diag(stiffness), 1e-9 * np.diag(stiffness).max()))
@@ -210,8 +214,8 @@ class BuildingScene:
             raise InputError(
                 "scene.building: stiffness and weights give no finite loads of the bearings; give smaller ones"
             )
-        found = scale * np.linalg.lstsq(scaled, scale * self.weights, rcond=1e-12)[0]
-        loads: Array = -springs * (rows @ found)
+        at_rest = scale * np.linalg.lstsq(scaled, scale * self.weights, rcond=1e-12)[0]
+        loads: Array = -springs * (rows @ at_rest)
         motions = self.building.rigid_motions
         left = motions.T @ (self.weights + rows.T @ loads)
         weight = float(np.abs(motions[:, 2] @ self.weights))
@@ -239,7 +243,7 @@ class BuildingScene:
     @property
     def modelled(self) -> tuple[Effects, ...]:
         """The effects of the model of every bearing: as given, or selected from the scene."""
-        return tuple(each.effects for each in self.effect_selections)
+        return tuple(selection.effects for selection in self.effect_selections)
 
     @property
     def every_bearing(self) -> tuple[Bearing, ...]:
@@ -250,8 +254,8 @@ class BuildingScene:
     def specs(self) -> tuple[ModelSpec, ...]:
         """Layouts and effects of the models of the bearings, each once."""
         pairs = zip(self.bearings, self.modelled, strict=True)
-        found = [ModelSpec(one.bearing.layout, replace(effects, top_rotation=True)) for one, effects in pairs]
-        return tuple(dict.fromkeys(found))
+        models = [ModelSpec(one.bearing.layout, replace(effects, top_rotation=True)) for one, effects in pairs]
+        return tuple(dict.fromkeys(models))
 
     def _node(self, index: int) -> Node:
         """The node to which a bearing is attached. Raises InputError: there is none, or it carries no bearing."""
@@ -296,15 +300,15 @@ class BuildingScene:
                 )
 
     def _check_gravity(self) -> None:
-        for index, each in enumerate(self.bearings):
-            if each.bearing.gravity != self.gravity:
+        for index, mount in enumerate(self.bearings):
+            if mount.bearing.gravity != self.gravity:
                 raise InputError(
-                    f"scene.bearings[{index}].bearing.gravity = {each.bearing.gravity}: that of the first is "
+                    f"scene.bearings[{index}].bearing.gravity = {mount.bearing.gravity}: that of the first is "
                     f"{self.gravity}; give all the same [m/s^2]"
                 )
 
     def _check_motion(self) -> None:
-        own = {f"scene.bearings[{i}].motion": each.motion for i, each in enumerate(self.bearings) if each.motion}
+        own = {f"scene.bearings[{i}].motion": mount.motion for i, mount in enumerate(self.bearings) if mount.motion}
         for name, motion in {"scene.motion": self.motion, **own}.items():
             if np.any(motion.coefficients[:, 3:]):
                 raise InputError(f"{name}: the ground rotates; a building takes translations, leave the rotation out")
@@ -325,7 +329,7 @@ def vertical_modes(scene: BuildingScene) -> VerticalModes:
 
     building, rows = scene.building, scene.attachments[:, 2]
     springs, dampers = (
-        rows.T * [getattr(each.interface, name) for each in scene.bearings] @ rows
+        rows.T * [getattr(mount.interface, name) for mount in scene.bearings] @ rows
         for name in ("vertical_stiffness", "vertical_damping")
     )
     squares, shapes = eigh(building.stiffness + springs, building.mass)
@@ -338,9 +342,9 @@ def vertical_modes(scene: BuildingScene) -> VerticalModes:
 
 def select_effects(scene: BuildingScene) -> tuple[EffectSelection, ...]:
     """The effects of every bearing: as given, or selected. Raises InputError where they exclude each other."""
-    if all(isinstance(each.effects, Effects) for each in scene.bearings):
+    if all(isinstance(mount.effects, Effects) for mount in scene.bearings):
         remaining: list[float] = [0.0] * len(scene.bearings)  # nothing is selected
-    elif any(_ground(scene, each) != _ground(scene, scene.bearings[0]) for each in scene.bearings):
+    elif any(_ground(scene, mount) != _ground(scene, scene.bearings[0]) for mount in scene.bearings):
         remaining = [-np.inf] * len(scene.bearings)  # the estimate has one motion of the ground
     else:
         remaining = remaining_loads(scene).tolist()
@@ -348,13 +352,13 @@ def select_effects(scene: BuildingScene) -> tuple[EffectSelection, ...]:
 
 
 def _selected(scene: BuildingScene, index: int, remaining: float) -> EffectSelection:
-    given = scene.bearings[index]
-    requested = Auto() if given.effects is None else given.effects
+    mount = scene.bearings[index]
+    requested = Auto() if mount.effects is None else mount.effects
     if isinstance(requested, Effects):
         return EffectSelection(requested)
     reasons = tuple(
         Reason(reason.effect, value, GIVEN) if (value := getattr(requested, reason.effect)) is not None else reason
-        for reason in _reasons(given.bearing, requested, remaining)
+        for reason in _reasons(mount.bearing, requested, remaining)
     )
     try:
         effects = requested.resolve(**{reason.effect: reason.chosen for reason in reasons})
@@ -396,8 +400,8 @@ def remaining_loads(scene: BuildingScene) -> Array:
     times = np.arange(0.0, scene.end, STEP)
     path = _ground(scene, scene.bearings[0]).displacement(times)[:, :2]
     overturning = _overturning(scene, float(np.linalg.norm(path - path[0], axis=1).max()))
-    found: Array = 1.0 + (_vertical_response(scene, times).min(axis=0) - overturning) / scene.axial_loads
-    return found
+    ratios: Array = 1.0 + (_vertical_response(scene, times).min(axis=0) - overturning) / scene.axial_loads
+    return ratios
 
 
 def _vertical_response(scene: BuildingScene, times: Array) -> Array:
@@ -408,8 +412,8 @@ def _vertical_response(scene: BuildingScene, times: Array) -> Array:
     from scipy.signal import cont2discrete, lfilter
 
     building, rows = scene.building, scene.attachments[:, 2]
-    springs = np.array([each.interface.vertical_stiffness for each in scene.bearings])
-    dampers = np.array([each.interface.vertical_damping for each in scene.bearings])
+    springs = np.array([mount.interface.vertical_stiffness for mount in scene.bearings])
+    dampers = np.array([mount.interface.vertical_damping for mount in scene.bearings])
     squares, modes, rates, _ = scene.vertical_modes
     part = -modes.T @ building.mass @ building.rigid_motions[:, 2]
     ground = _ground(scene, scene.bearings[0]).acceleration(times)[:, 2]
@@ -426,10 +430,10 @@ def _vertical_response(scene: BuildingScene, times: Array) -> Array:
 
 def _overturning(scene: BuildingScene, distance: float) -> Array:
     """Largest change of the axial loads by overturning, shape (bearings,) [N]. distance: of the ground [m]."""
-    share = max(_force_share(each.bearing, distance) for each in scene.bearings)
+    share = max(_force_share(mount.bearing, distance) for mount in scene.bearings)
     motions = scene.building.rigid_motions
     moment = share * scene.gravity * float(np.abs((motions.T @ scene.building.mass @ motions)[0, 4]))
-    springs = np.array([each.interface.vertical_stiffness for each in scene.bearings])
+    springs = np.array([mount.interface.vertical_stiffness for mount in scene.bearings])
     arms = scene.attachments[:, 2] @ motions[:, 3:5]
     arms -= springs @ arms / springs.sum()
     rocking = springs @ arms**2

@@ -101,10 +101,10 @@ class Storey:
         if self.height >= HIGHEST:
             raise InputError(f"storey.height = {self.height:g} m: no storey is as high; is it in mm? Give it in m")
         if (self.vertical_stiffness is None) != (self.rocking_stiffness is None):
-            given, other = ("vertical_stiffness", "rocking_stiffness")
-            given, other = (given, other) if self.rocking_stiffness is None else (other, given)
+            stated, other = ("vertical_stiffness", "rocking_stiffness")
+            stated, other = (stated, other) if self.rocking_stiffness is None else (other, stated)
             raise InputError(
-                f"storey.{given} = {getattr(self, given)!r}: columns that shorten let the floor sink and tilt; give "
+                f"storey.{stated} = {getattr(self, stated)!r}: columns that shorten let the floor sink and tilt; give "
                 f"storey.{other} as well"
             )
 

@@ -112,16 +112,16 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     """Tables of a summary: the floors, storeys and bearings."""
     storeys = [_storeys(summary["storeys"])] if summary["storeys"] else []
     bearings = summary["bearings"]
-    lifted = [_uplift(bearings)] if any(each["uplift"]["count"] for each in bearings) else []
+    lifted = [_uplift(bearings)] if any(bearing["uplift"]["count"] for bearing in bearings) else []
     return [_floors(summary["floors"]), *storeys, _bearings(bearings), *lifted]
 
 
 def rims_text(bearings: Sequence[Mapping[str, Any]]) -> str:
     """The surfaces that met their rims, and the bearings in which they did, by name or number."""
     groups: dict[str, list[str]] = {}
-    for each in bearings:
-        if each["rims_met"]:
-            groups.setdefault(_numbers(each["rims_met"]), []).append(each["name"] or str(each["number"]))
+    for bearing in bearings:
+        if bearing["rims_met"]:
+            groups.setdefault(_numbers(bearing["rims_met"]), []).append(bearing["name"] or str(bearing["number"]))
     texts = [
         f"{surfaces} of {', '.join(names) if len(names) < len(bearings) else 'all bearings'}"
         for surfaces, names in groups.items()
@@ -143,12 +143,12 @@ def _energy(energy: Mapping[str, float]) -> str:
 def _floors(floors: Sequence[Mapping[str, Any]]) -> Table:
     rows = [
         (
-            each["name"],
-            f"{each['height']:g}",
-            *(f"{each['peak_acceleration'][key]:.3f}" for key in ("E1", "E2", "E3")),
-            *(f"{1e3 * each['peak_displacement'][key]:.1f}" for key in ("E1", "E2")),
+            floor["name"],
+            f"{floor['height']:g}",
+            *(f"{floor['peak_acceleration'][key]:.3f}" for key in ("E1", "E2", "E3")),
+            *(f"{1e3 * floor['peak_displacement'][key]:.1f}" for key in ("E1", "E2")),
         )
-        for each in reversed(floors)
+        for floor in reversed(floors)
     ]
     columns = ("floor", "z [m]", "a1 [m/s^2]", "a2", "a3", "u1 [mm]", "u2")
     return Table("peaks of floors: absolute acceleration, displacement from the ground", columns, rows)
@@ -157,14 +157,14 @@ def _floors(floors: Sequence[Mapping[str, Any]]) -> Table:
 def _storeys(storeys: Sequence[Mapping[str, Any]]) -> Table:
     rows = [
         (
-            each["name"],
-            *(f"{1e3 * each['peak_drift'][key]:.2f}" for key in ("E1", "E2")),
-            f"{100 * each['peak_drift_ratio']:.3f}",
-            f"{100 * each['peak_corner_drift_ratio']:.3f}",
-            *(f"{1e-6 * each['peak_shear'][key]:.3f}" for key in ("E1", "E2")),
-            f"{1e-6 * each['peak_torsion']:.3f}",
+            storey["name"],
+            *(f"{1e3 * storey['peak_drift'][key]:.2f}" for key in ("E1", "E2")),
+            f"{100 * storey['peak_drift_ratio']:.3f}",
+            f"{100 * storey['peak_corner_drift_ratio']:.3f}",
+            *(f"{1e-6 * storey['peak_shear'][key]:.3f}" for key in ("E1", "E2")),
+            f"{1e-6 * storey['peak_torsion']:.3f}",
         )
-        for each in reversed(storeys)
+        for storey in reversed(storeys)
     ]
     columns = (
         "storey",
@@ -183,16 +183,16 @@ def _bearings(bearings: Sequence[Mapping[str, Any]]) -> Table:
     """Peaks of every bearing."""
     rows = [
         (
-            str(each["number"]),
-            each["name"] or "-",
-            f"{1e3 * each['peak_displacement']['radial']:.1f}",
-            f"{1e-3 * each['peak_force']['radial']:.1f}",
-            f"{1e-3 * each['axial_load']:.1f}",
-            f"{each['minimum_load_ratio']:.2f} ... {each['maximum_load_ratio']:.2f}",
-            f"{1e3 * min(each['minimum_gap']):.1f}",
-            _numbers(each["rims_met"]) or "-",
+            str(bearing["number"]),
+            bearing["name"] or "-",
+            f"{1e3 * bearing['peak_displacement']['radial']:.1f}",
+            f"{1e-3 * bearing['peak_force']['radial']:.1f}",
+            f"{1e-3 * bearing['axial_load']:.1f}",
+            f"{bearing['minimum_load_ratio']:.2f} ... {bearing['maximum_load_ratio']:.2f}",
+            f"{1e3 * min(bearing['minimum_gap']):.1f}",
+            _numbers(bearing["rims_met"]) or "-",
         )
-        for each in bearings
+        for bearing in bearings
     ]
     columns = ("no.", "name", "u [mm]", "F [kN]", "N at rest [kN]", "N / N at rest", "least left [mm]", "rims")
     return Table("peaks of bearings; left: capacity less sliding; rims: surfaces", columns, rows)
@@ -202,14 +202,14 @@ def _uplift(bearings: Sequence[Mapping[str, Any]]) -> Table:
     """Uplift of every bearing that lifted."""
     rows = [
         (
-            str(each["number"]),
-            each["name"] or "-",
-            f"{1e3 * each['uplift']['height']:.3g}",
-            f"{1e3 * each['uplift']['duration']:.3g}",
-            str(each["uplift"]["count"]),
+            str(bearing["number"]),
+            bearing["name"] or "-",
+            f"{1e3 * bearing['uplift']['height']:.3g}",
+            f"{1e3 * bearing['uplift']['duration']:.3g}",
+            str(bearing["uplift"]["count"]),
         )
-        for each in bearings
-        if each["uplift"]["count"]
+        for bearing in bearings
+        if bearing["uplift"]["count"]
     ]
     return Table("uplift of bearings", ("no.", "name", "height [mm]", "longest [ms]", "times"), rows)
 
