@@ -107,7 +107,7 @@ def summary_page(result: AnyResult) -> list[Table]:
 
 def note_tables(result: AnyResult) -> list[Table]:
     """A table of all notes of the run, the most important first; none without notes."""
-    rows = [(f"t = {note.time:.6g} s", note.told) for note in by_importance(result.notes)]
+    rows = [(f"t = {note.time:.6g} s", note.sentence) for note in by_importance(result.notes)]
     return [Table("notes, the most important first", (), rows)] if rows else []
 
 

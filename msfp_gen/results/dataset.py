@@ -217,14 +217,14 @@ def _events(read: Arrays, surfaces: int) -> tuple[Event, ...]:
     return tuple(Event(float(t), int(s), kind, u, force) for t, s, kind, u, force in rows)
 
 
-def _extremes(given: dict[str, list[float]], surfaces: int) -> Extremes:
+def _extremes(table: dict[str, list[float]], surfaces: int) -> Extremes:
     """Extremes of all steps; the numbers are finite."""
-    found = Extremes.of_table(given)
-    for name, values in found.table.items():
+    extremes = Extremes.of_table(table)
+    for name, values in extremes.table.items():
         shape = np.shape(values)
         if shape != ((4,) if name in ("displacement", "top_force") else (surfaces,)) or not np.isfinite(values).all():
             raise ValueError(f"extremes: {name} is no list of finite numbers of the right length")
-    return found
+    return extremes
 
 
 PARAMETER = "parameter"

@@ -69,12 +69,14 @@ class Extremes:
         numbers: name and shape of each, `EXTREMES` of the extension. recorded: one after the other. azimuth: of the
         frame of a planar model [rad], in which all horizontal vectors are along E1.
         """
-        found = {name: values.ravel() for name, values in parts(recorded, numbers).items()}
+        extremes = {name: values.ravel() for name, values in parts(recorded, numbers).items()}
         if azimuth:
             for name in ("displacement", "top_force"):
-                along, _, vertical, radial = found[name]
-                found[name] = np.array([along * abs(np.cos(azimuth)), along * abs(np.sin(azimuth)), vertical, radial])
-        return cls(**found)
+                along, _, vertical, radial = extremes[name]
+                extremes[name] = np.array(
+                    [along * abs(np.cos(azimuth)), along * abs(np.sin(azimuth)), vertical, radial]
+                )
+        return cls(**extremes)
 
     @classmethod
     def of_table(cls, table: dict[str, Any]) -> Extremes:
@@ -94,12 +96,12 @@ class Extremes:
 
     def __or__(self, other: Extremes) -> Extremes:
         """Extremes of both."""
-        found: dict[str, Any] = {}
+        extremes: dict[str, Any] = {}
         for name in (f.name for f in fields(self)):
             one, two = getattr(self, name), getattr(other, name)
             known = [value for value in (one, two) if value is not None]
-            found[name] = (np.min if name in LEAST else np.max)(known, axis=0) if known else None
-        return Extremes(**found)
+            extremes[name] = (np.min if name in LEAST else np.max)(known, axis=0) if known else None
+        return Extremes(**extremes)
 
 
 def largest(vectors: Array) -> Array:

@@ -298,15 +298,15 @@ def sections(result: RunData, azimuth: float | None = None) -> list[Section]:
     angle = azimuth_of(result) if azimuth is None else azimuth
     shapes = [outline(bearing, body) for body in range(bearing.layout.n)]
     faces = [(bearing.slider(surface), slider_face(bearing, surface)) for surface in range(bearing.layout.surfaces)]
-    found = []
+    sections = []
     for row in range(len(stack)):
         bottom, basis = stack.bottom[row], stack.basis[row]
         plane = Plane((bottom + stack.top[row])[1 : max(2, bearing.layout.n - 1)].mean(axis=0) / 2, angle)
         bodies = [_closed(*cut(shape, bottom[k], basis[k], plane)) for k, shape in enumerate(shapes)]
         arcs = [_open(*cut(face, bottom[k], basis[k], plane)) for k, face in faces]
         projected = (stack.contact, stack.centre, stack.line, stack.force)
-        found.append(Section(angle, bodies, arcs, *(plane.project(x[row]) for x in projected)))
-    return found
+        sections.append(Section(angle, bodies, arcs, *(plane.project(x[row]) for x in projected)))
+    return sections
 
 
 def azimuth_of(result: RunData) -> float:

@@ -69,17 +69,19 @@ class Gradients:
         energies: of `energy_terms`.
         """
         rows, events = run.gradient_rows(len(parameters))[:count], run.gradient_events(len(parameters))
-        found = [unpacked(model, rows[:, i], azimuth, sprung) for i in range(len(parameters))]
+        by_parameter = [unpacked(model, rows[:, i], azimuth, sprung) for i in range(len(parameters))]
         constant = {"time", "energy"} | (set() if model.effects.uplift else {"lift", "separation"})
-        names = [name for name, values in found[0].items() if name not in constant and values is not None]
+        names = [name for name, values in by_parameter[0].items() if name not in constant and values is not None]
         if model.effects.uplift:
             is_open = model.unpack(run.rows[:count])["compression"] < 0
-            for each, slopes in zip(found, np.moveaxis(rows, 1, 0), strict=True):
-                each["lift"] = np.where(is_open, -model.unpack(slopes)["compression"], 0.0)
+            for arrays_of, slopes in zip(by_parameter, np.moveaxis(rows, 1, 0), strict=True):
+                arrays_of["lift"] = np.where(is_open, -model.unpack(slopes)["compression"], 0.0)
         vectors = (out_of_plane(events[:, :, 1 + 3 * i : 4 + 3 * i], azimuth, "vector") for i in range(2))
         displacement, force = (np.moveaxis(vector, 1, 0) for vector in vectors)
-        arrays = {name: np.array([each[name] for each in found]) for name in names}
-        arrays |= {f"energy_{name}": np.array([each["energy"][name] for each in found]) for name in energies}
+        arrays = {name: np.array([arrays_of[name] for arrays_of in by_parameter]) for name in names}
+        arrays |= {
+            f"energy_{name}": np.array([arrays_of["energy"][name] for arrays_of in by_parameter]) for name in energies
+        }
         arrays |= dict(zip(EVENTS, (events[:, :, 0].T, displacement, force), strict=True))
         return cls(
             parameters,
@@ -114,19 +116,19 @@ SERIES = {
 
 def gradients_of_extremes(gradients: Gradients, history: History, recorded: Extremes) -> dict[str, Array]:
     """Derivatives of `RunData.extremes` by name, each of shape (k, number of values) [SI]."""
-    found = {}
+    derivatives = {}
     for name in (f.name for f in fields(Extremes) if f.name in SERIES):
         values = getattr(recorded, name)
         if values is None:
             continue
-        steps = np.array([getattr(each, name) for each in gradients.extremes])
+        steps = np.array([getattr(extremes, name) for extremes in gradients.extremes])
         series, slopes = _series(name, gradients, history)
         sign = -1.0 if name in LEAST else 1.0
         row = (sign * series).argmax(axis=0)
         columns = np.arange(series.shape[1])
         beyond = sign * (series[row, columns] - values) > 0
-        found[name] = np.where(beyond, slopes[:, row, columns], steps)
-    return found
+        derivatives[name] = np.where(beyond, slopes[:, row, columns], steps)
+    return derivatives
 
 
 def _series(name: str, gradients: Gradients, history: History) -> tuple[Array, Array]:

@@ -128,8 +128,8 @@ class BearingRows:
 
     def arrays(self) -> dict[str, Array]:
         """The arrays of this run by field, without those that are None; see `quantities` for shapes and units."""
-        found = {name: getattr(self, name, None) for name in quantities()}
-        return {name: values for name, values in found.items() if values is not None}
+        arrays = {name: getattr(self, name, None) for name in quantities()}
+        return {name: values for name, values in arrays.items() if values is not None}
 
     @property
     def horizontal(self) -> Array:

@@ -77,10 +77,10 @@ class Joint:
         """Rows of segment `index` as rows of the whole."""
         if len(self._first) == 1:
             return rows
-        given, last = rows.arrays(), self._first[-1].arrays()
-        missing = {name: self._before.get(name, last[name][0]) for name in last if name not in given}
+        recorded, last = rows.arrays(), self._first[-1].arrays()
+        missing = {name: self._before.get(name, last[name][0]) for name in last if name not in recorded}
         columns: dict[str, Any] = dict.fromkeys(quantities())
-        columns |= {name: given[name] for name in last if name in given}
+        columns |= {name: recorded[name] for name in last if name in recorded}
         columns |= {name: np.tile(value, (len(rows.time), 1)) for name, value in missing.items()}
         start = self._first[0]
         columns["displacement"] = rows.base_displacement - rows.top_displacement
@@ -185,11 +185,11 @@ def _of_groups(block: History, group: int) -> Any:
 
 def _of_extremes(rows: History) -> Any:
     """Rows with the least and the largest of each number, the first of equal ones, and the ends."""
-    found = [0, len(rows.time) - 1]
+    chosen = [0, len(rows.time) - 1]
     numbers = [_columns(values) for name, values in rows.arrays().items() if name != "time"]
     for column in np.concatenate([*numbers, *(_columns(values) for values in rows.energy.values())], axis=1).T:
-        found += [int(column.argmin()), int(column.argmax())]
-    return np.unique([*found, int(rows.horizontal.argmax()), first_peak(rows.horizontal)])
+        chosen += [int(column.argmin()), int(column.argmax())]
+    return np.unique([*chosen, int(rows.horizontal.argmax()), first_peak(rows.horizontal)])
 
 
 def _columns(values: Array) -> Array:

@@ -39,10 +39,10 @@ class Note:
     @property
     def line(self) -> str:
         """Time, text and action."""
-        return f"t = {self.time:.6g} s: {self.told}"
+        return f"t = {self.time:.6g} s: {self.sentence}"
 
     @property
-    def told(self) -> str:
+    def sentence(self) -> str:
         """Text and action."""
         return self.text + (f"; continued with {self.action}" if self.action else "")
 
@@ -126,7 +126,7 @@ def joined_notes(earlier: Iterable[Note], later: Iterable[Note]) -> list[Note]:
     """
     notes = list(earlier)
     for note in later:
-        alike = (i for i, each in enumerate(notes) if each.kind == note.kind and not (each.action or note.action))
+        alike = (i for i, other in enumerate(notes) if other.kind == note.kind and not (other.action or note.action))
         index = next(alike, None)
         if index is None:
             notes.append(note)

@@ -49,10 +49,10 @@ class StoredGroup:
         """A group in this one."""
         import h5py
 
-        found = self._group.get(name)
-        if not isinstance(found, h5py.Group):
+        group = self._group.get(name)
+        if not isinstance(group, h5py.Group):
             raise ValueError(f"the group {name} is missing")
-        return StoredGroup(found, self._size)
+        return StoredGroup(group, self._size)
 
     def attributes(self, wanted: Callable[[str], bool]) -> dict[str, Attribute]:
         """The attributes with names that are `wanted`, as texts and numbers."""
@@ -88,20 +88,20 @@ class StoredGroup:
         if dataset.shape != (count,) or h5py.check_string_dtype(dataset.dtype) is None:
             raise ValueError(f"{name} is no list of {count} texts")
         self._check_storage(dataset, name, compressed=True)
-        found: list[str] = []
+        texts: list[str] = []
         for start in range(0, count, BLOCK):  # many texts of the file can be the same long one
-            found += dataset.asstr()[start : start + BLOCK].tolist()
-            if not set(found[start:]) <= set(words):
+            texts += dataset.asstr()[start : start + BLOCK].tolist()
+            if not set(texts[start:]) <= set(words):
                 raise ValueError(f"{name} has a word that is none of {', '.join(words)}")
-        return found
+        return texts
 
     def _dataset(self, name: str) -> h5py.Dataset:
         import h5py
 
-        found = self._group.get(name)
-        if not isinstance(found, h5py.Dataset):
+        dataset = self._group.get(name)
+        if not isinstance(dataset, h5py.Dataset):
             raise ValueError(f"{name} is missing")
-        return found
+        return dataset
 
     def _check_storage(self, dataset: h5py.Dataset, name: str, compressed: bool) -> None:
         """Raise ValueError unless the data lies in the file and has the size that its bytes there can have."""
@@ -193,9 +193,9 @@ class ArrayDigest:
     @classmethod
     def of(cls, values: Any) -> ArrayDigest:
         """That of a whole array."""
-        found = cls()
-        found.add(values)
-        return found
+        layout = cls()
+        layout.add(values)
+        return layout
 
     def add(self, values: Any) -> None:
         """Add the next rows."""

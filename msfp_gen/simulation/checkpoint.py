@@ -50,9 +50,9 @@ def kept_rows(path: str | Path) -> list[Path]:
 
 def require_no_checkpoint(checkpoint: str | Path) -> None:
     """Raise InputError where a later segment has a checkpoint file: it would conflict in the middle of the run."""
-    if found := [file for file in checkpoint_files(checkpoint) if file != Path(checkpoint)] + kept_rows(checkpoint):
+    if existing := [file for file in checkpoint_files(checkpoint) if file != Path(checkpoint)] + kept_rows(checkpoint):
         raise InputError(
-            f"checkpoint = {str(checkpoint)!r}: {str(found[0])!r} exists; resume it, or remove it to start anew"
+            f"checkpoint = {str(checkpoint)!r}: {str(existing[0])!r} exists; resume it, or remove it to start anew"
         )
 
 

@@ -48,17 +48,20 @@ def start_gradients(
     the energies that are integrals over the run. start: derivatives of the initial state; None: it is constant. Raises
     InputError where a parameter leads out of the plane of a planar model.
     """
-    found = [
+    inputs = [
         _Inputs(scene, model, parameter, None if start is None else (start.q[i], start.h[i])).arrays
         for i, parameter in enumerate(parameters)
     ]
-    histories = {name: [each[name] for each in found if each[name] is not None] for name in ("motion", "load")}
+    histories = {
+        name: [arrays_of[name] for arrays_of in inputs if arrays_of[name] is not None] for name in ("motion", "load")
+    }
     stacked: dict[str, Any] = {
-        name: np.array([each[name] for each in found]) for name in ("gravity", "bodies", "surfaces", "top", *_STATE)
+        name: np.array([arrays_of[name] for arrays_of in inputs])
+        for name in ("gravity", "bodies", "surfaces", "top", *_STATE)
     }
     for name, arrays in histories.items():
-        given = np.array([each[name] is not None for each in found], dtype=bool)
-        stacked[name] = np.where(given, np.cumsum(given) - 1.0, -1.0)
+        present = np.array([arrays_of[name] is not None for arrays_of in inputs], dtype=bool)
+        stacked[name] = np.where(present, np.cumsum(present) - 1.0, -1.0)
         stacked[f"{name}s"] = np.array(arrays) if arrays else np.zeros(0)
     stacked["f"] = stacked.pop("h")
     contiguous = {name: np.ascontiguousarray(array, float) for name, array in stacked.items()}
@@ -198,10 +201,10 @@ class _Inputs:
         load = first_load(self.scene) - load_values(top)[2]
         load -= 0.0 if arrays["load"] is None else 1j * step * arrays["load"][0, 2, 0]
         stiffness = surfaces[:, self.seat] + 1j * step * arrays["surfaces"][:, self.seat]
-        found = np.zeros_like(arrays["q"])
+        heights = np.zeros_like(arrays["q"])
         gravity = bearing.gravity + 1j * step * arrays["gravity"]
-        found[:, 2] = -settlements(load, gravity, masses, stiffness).imag / step
-        arrays["q"], arrays["v"] = np.hstack([arrays["q"], found]), np.hstack([arrays["v"], np.zeros_like(found)])
+        heights[:, 2] = -settlements(load, gravity, masses, stiffness).imag / step
+        arrays["q"], arrays["v"] = np.hstack([arrays["q"], heights]), np.hstack([arrays["v"], np.zeros_like(heights)])
 
     def _leaves_plane(self) -> InputError:
         return InputError(

@@ -61,7 +61,7 @@ CONTACT_IN_LONG_STEP = (
 class RunParts(Protocol):
     """What is needed of a run that has ended: its scene, the parameters of its derivatives and its segments."""
 
-    given: Scene
+    scene: Scene
     parameters: tuple[Parameter, ...]
     energies: bool
     segments: list[Segment]
@@ -85,9 +85,9 @@ def gradient_parameters(
         )
     if scene.stop is not None:
         raise InputError(f"stop: gradients need a run of fixed duration; give a duration instead, or {ADVICE}")
-    if needs_settling(scene) and (given := [p.path for p in parameters if p.part == "initial_state"]):
+    if needs_settling(scene) and (states := [p.path for p in parameters if p.part == "initial_state"]):
         raise InputError(
-            f"gradients = {given[0]!r}: tilted plates start in the state after a slow tilting; give an initial_state"
+            f"gradients = {states[0]!r}: tilted plates start in the state after a slow tilting; give an initial_state"
         )
     if checkpoint is not None:
         raise InputError(f"checkpoint = {str(checkpoint)!r}: a checkpoint holds no gradients; leave out one of them")
@@ -113,18 +113,18 @@ def run_gradients(sequence: RunParts, rows: int, events: Sequence[Event]) -> Gra
     """
     if not sequence.parameters:
         return None
-    scene, segment = sequence.given, sequence.segments[-1]
+    scene, segment = sequence.scene, sequence.segments[-1]
     azimuth, sprung = segment.azimuth, is_sprung(scene.top)
     if sequence.energies and events and quasistatic(scene, segment.model.effects):
         raise InputError(CONTACT_IN_LONG_STEP.format(time=events[0].time, surface=events[0].surface))
     energies = energy_terms(sequence.energies, segment.model.effects.uplift)
-    found = Gradients.of_run(sequence.parameters, energies, segment.model, segment.run, rows, azimuth, sprung)
+    gradients = Gradients.of_run(sequence.parameters, energies, segment.model, segment.run, rows, azimuth, sprung)
     steps, undamped = segment.run.counts["steps"], undamped_surfaces(scene, segment.model.effects)
     resolved = undamped and segment.run.time < steps * RESOLVED_SHARE * slider_period(scene)
-    for parameter, size in zip(found.parameters, found.largest_numbers(), strict=True):
+    for parameter, size in zip(gradients.parameters, gradients.largest_numbers(), strict=True):
         if resolved or not np.isfinite(size):
             raise InputError(f"gradients = {parameter.path!r}: {RINGING}")
-    return found
+    return gradients
 
 
 def with_gradient_errors(result: Result, run: Callable[[Scene], Result]) -> Result:
@@ -152,7 +152,7 @@ def with_gradient_errors(result: Result, run: Callable[[Scene], Result]) -> Resu
 
 def _of_peaks(error: Gradients, gradients: Gradients, index: int) -> float:
     """The largest error of the derivative of a peak, over the largest derivative of peaks of its kind."""
-    errors, slopes = (each.extremes[index].arrays for each in (error, gradients))
+    errors, slopes = (derivatives.extremes[index].arrays for derivatives in (error, gradients))
     return max(float(errors[name].max() / (np.abs(slopes[name]).max() or np.inf)) for name in PEAKS)
 
 
@@ -168,12 +168,12 @@ def gradient_notes(sequence: RunParts, events: Sequence[Event]) -> tuple[Note, .
     if not sequence.parameters:
         return ()
     effects = sequence.segments[-1].model.effects
-    found = undamped_surfaces(sequence.given, effects)[:1]
-    if found:
-        return tuple(Note(0.0, "ringing", surface, 0.0, UNDAMPED.format(surface=surface)) for surface in found)
+    undamped = undamped_surfaces(sequence.scene, effects)[:1]
+    if undamped:
+        return tuple(Note(0.0, "ringing", surface, 0.0, UNDAMPED.format(surface=surface)) for surface in undamped)
     contact = next((event for event in events if event.kind == "rim_contact"), None)
-    damping = min(surface.contact_damping for surface in sequence.given.bearing.surfaces)
-    critical = slider_period(sequence.given) / pi  # T omega/2 = 1
+    damping = min(surface.contact_damping for surface in sequence.scene.bearing.surfaces)
+    critical = slider_period(sequence.scene) / pi  # T omega/2 = 1
     if contact is None or effects.sliders == "massless" or damping >= critical:
         return ()
     advised = max(1e-3, 1.2 * critical)
@@ -191,7 +191,7 @@ def measured_errors(result: Result, finer: Result) -> Gradients:
     assert ours is not None
     assert theirs is not None
     at, times = result.history.time, finer.history.time
-    passed = [np.searchsorted([event.time for event in each.events], at) for each in (result, finer)]
+    passed = [np.searchsorted([event.time for event in run.events], at) for run in (result, finer)]
     spans = np.split(np.arange(len(at)), np.flatnonzero(np.any(np.diff(passed) != 0, axis=0)) + 1)
     above = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
     share = np.clip((at - times[above - 1]) / (times[above] - times[above - 1]), 0.0, 1.0)

@@ -49,8 +49,8 @@ def extremes_of(segments: Sequence[Segment]) -> Extremes | None:
     """
     started = [s for s in segments if s.run.row_count]
     counted = [s for s in started if s.run.counts["steps"]] or started[-1:]
-    found = [Extremes.of_run(s.model.extension.EXTREMES, s.run.extremes, s.azimuth) for s in counted]
-    return reduce(or_, found) if found else None
+    extremes = [Extremes.of_run(s.model.extension.EXTREMES, s.run.extremes, s.azimuth) for s in counted]
+    return reduce(or_, extremes) if extremes else None
 
 
 def provenance_of(solver: Solver, models: str) -> dict[str, str]:

@@ -52,7 +52,7 @@ class RowFile:
             self._file = path.open("r+b" if resume and path.exists() else "w+b", buffering=0)
 
     @classmethod
-    def beside(cls, checkpoint: Path | None, folder: Path, model: Model, resume: bool) -> RowFile:
+    def of_segment(cls, checkpoint: Path | None, folder: Path, model: Model, resume: bool) -> RowFile:
         """That of a new segment: beside its checkpoint, if it has one, else in `folder`."""
         path = None if checkpoint is None else rows_beside(checkpoint)
         return cls(path, folder, model.extension.ROW_SIZE, resume)
@@ -78,18 +78,18 @@ class RowFile:
 
     def restore(self, count: int, checksum: object) -> None:
         """Continue after `count` rows, and forget those after them. Raises ValueError where they are not there."""
-        found, step = 0, 2**24
+        computed, step = 0, 2**24
         end = count * self._row_bytes
         if os.fstat(self._file.fileno()).st_size < end:
             raise ValueError("rows are missing")
         self._file.seek(0)
         for start in range(0, end, step):
-            found = zlib.crc32(self._file.read(min(step, end - start)) or b"", found)
-        if found != checksum:
+            computed = zlib.crc32(self._file.read(min(step, end - start)) or b"", computed)
+        if computed != checksum:
             raise ValueError("rows were changed")
         self._file.truncate(end)
         self._file.seek(end)
-        self.count, self.checksum = count, found
+        self.count, self.checksum = count, computed
 
     def read(self, start: int, end: int) -> Array:
         """Rows from one number to another, shape (T, row size) [SI]."""

@@ -147,7 +147,7 @@ def start_temperatures(segments: Sequence[Segment], scene: Scene) -> dict[str, A
     if law is None or not law.depends_on_temperature:
         return {}
     parameters = [law_parameters(law, scene.bearing, index) for index in range(scene.bearing.layout.surfaces)]
-    return {"temperature": np.array([each["start_temperature"] for each in parameters])}
+    return {"temperature": np.array([of_surface["start_temperature"] for of_surface in parameters])}
 
 
 def wrench_pieces(scene: Scene) -> tuple[Array, Array]:
@@ -174,7 +174,7 @@ def _support_rotation(scene: Scene, coefficients: Array) -> tuple[Array, Array]:
 
 def time_grid(scene: Scene) -> TimeGrid:
     """Times at which steps of a run of `scene` must end, and limits of the step."""
-    histories = [each for each in (scene.motion, scene.load, scene.top_rotation) if each is not None]
+    histories = [history for history in (scene.motion, scene.load, scene.top_rotation) if history is not None]
     return TimeGrid.of_histories(histories, scene.end, (scene.solver.max_step, scene.motion.max_step))
 
 

@@ -59,14 +59,14 @@ def settling_scene(scene: Scene) -> Scene:
 
 def _effects(scene: Scene) -> Auto:
     """Rims and friction law as given in the scene; the other effects are selected for the slow tilting."""
-    given = scene.effects
-    spin = given.spin if SPIN[given.spin].moment else "locked"
+    effects = scene.effects
+    spin = effects.spin if SPIN[effects.spin].moment else "locked"
     return Auto(
-        rims=given.rims,
+        rims=effects.rims,
         spin=spin,
-        bouc_wen=given.bouc_wen,
-        friction=given.friction,
-        friction_law=given.friction_law,
+        bouc_wen=effects.bouc_wen,
+        friction=effects.friction,
+        friction_law=effects.friction_law,
     )
 
 

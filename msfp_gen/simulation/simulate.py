@@ -173,11 +173,11 @@ def simulate(
     if checkpoint is not None and not resume:
         require_no_checkpoint(checkpoint)
     if isinstance(scene, BuildingScene):
-        given = {
+        options = {
             "strict": strict, "stream": stream is not None, "gradients": bool(gradients),
             "energy_gradients": energy_gradients, "gradient_errors": not gradient_errors,
         }  # fmt: skip
-        if unknown := [name for name, value in given.items() if value]:
+        if unknown := [name for name, value in options.items() if value]:
             raise InputError(f"{unknown[0]}: the run of a building has no such option; leave it out")
         return simulate_building(scene, progress, checkpoint, every, resume, threads)
     if not isinstance(scene, Scene):
@@ -217,14 +217,14 @@ def simulate(
 class RunSequence:
     """The segments of a run that have ended, and the effects of the next one.
 
-    given: the scene of the user. scene: the same with the initial state after settling. effects: of the next segment;
+    scene: that of the user. settled: the same with the initial state after settling. effects: of the next segment;
     None: the run has ended. notes: those of the segments that have ended. stream: the file to which all rows go.
     parameters: of the derivatives; energies: whether these include energies that are integrals over the run. start: the
     derivatives of the state after settling; None: the run starts as the scene says.
     """
 
-    given: Scene
     scene: Scene
+    settled: Scene
     strict: bool
     effects: Effects | None
     segments: list[Segment]
@@ -243,7 +243,7 @@ class RunSequence:
 
     def start_segment(self, model: Model) -> tuple[Run, float]:
         """The compiled run of the next segment before its first step, and the azimuth of its frame [rad]."""
-        scene, selection = self.scene, self.scene.effect_selection
+        scene, selection = self.settled, self.settled.effect_selection
         last = [segment for segment in self.segments if segment.run.row_count][-1:]  # one that failed at once has none
         at = RestartState.of(last[0].model, last[0].run, last[0].azimuth) if last else None
         end = min(scene.end, selection.plane_until) if model.effects.dimension == "planar" else scene.end
@@ -258,7 +258,7 @@ class RunSequence:
         assert self.effects is not None
         segment = _segment(self, progress, options)
         self.segments.append(segment)
-        following = None if self.strict else next_effects(self.scene, segment.ending)
+        following = None if self.strict else next_effects(self.settled, segment.ending)
         notes = monitor_notes(segment.ending, following)
         self.notes = joined_notes(self.notes, notes)
         if self.parameters and following is not None:
@@ -272,17 +272,17 @@ class RunSequence:
         """
         last = self.segments[-1]
         if self.stream is not None:
-            rows_on_disk = StreamedRows(self.segments, self.given)
+            rows_on_disk = StreamedRows(self.segments, self.scene)
             if rows_on_disk.count:
                 return rows_on_disk.written(partial(_result, self), self.stream)
         if not self.parameters and not any(segment.run.row_count for segment in self.segments):
             last.run.record_now()
         parts = [(s, rows) for s in self.segments if len(rows := finite_rows(s.run.rows))]
         if not parts:
-            raise RunError(message_of(self.scene, last), status=last.status)
-        sprung, before = is_sprung(self.given.top), start_temperatures(self.segments, self.given)
+            raise RunError(message_of(self.settled, last), status=last.status)
+        sprung, before = is_sprung(self.scene.top), start_temperatures(self.segments, self.scene)
         histories = [history_of(segment.model, rows, segment.azimuth, sprung) for segment, rows in parts]
-        return _result(self, joined(histories, self.given.output_step, before))
+        return _result(self, joined(histories, self.scene.output_step, before))
 
 
 def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, StartSlopes | None]:
@@ -305,14 +305,14 @@ def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, S
 
 def _segment(sequence: RunSequence, progress: Progress | None, options: CheckpointOptions) -> Segment:
     """Build the model of the next segment and run it to its end."""
-    scene, effects = sequence.scene, sequence.effects
+    scene, effects = sequence.settled, sequence.effects
     assert effects is not None
     check(scene, effects)
     start = time.perf_counter()
     model = build_model(scene.bearing.layout, effects, gradients=bool(sequence.parameters))
     path, every, resume = options
     checkpoint = None if path is None else Checkpoint(path, Identity.of(scene, model), every, resume)
-    stored = None if sequence.stream is None else RowFile.beside(path, sequence.stream.parent, model, resume)
+    stored = None if sequence.stream is None else RowFile.of_segment(path, sequence.stream.parent, model, resume)
     run, azimuth = sequence.start_segment(model)
     if checkpoint is not None:
         checkpoint.restore(run, stored)
@@ -359,7 +359,7 @@ def _advance(
 
 
 def _result(sequence: RunSequence, history: History) -> Result:
-    scene, segments, last = sequence.given, sequence.segments, sequence.segments[-1]
+    scene, segments, last = sequence.scene, sequence.segments, sequence.segments[-1]
     counts = [{k: int(n) for k, n in segment.run.counts.items()} for segment in segments]
     total = Counters(**{name: sum(count[name] for count in counts) for name in counts[0]})
     events = tuple(event for s in segments for event in events_of(s.model, s.run, s.azimuth))

@@ -55,14 +55,14 @@ class StreamedRows:
 
     def read(self, start: int, end: int) -> History:
         """Rows of the whole run, from one number to another."""
-        found, before = [], 0
+        parts, before = [], 0
         for index, (begin, stop) in enumerate(self._joint.kept):
             first, last = max(start - before, 0), min(end - before, stop - begin)
             if last > first:
                 rows = self._parts[index].history(begin + first, begin + last)
-                found.append(self._joint.continued(index, rows))
+                parts.append(self._joint.continued(index, rows))
             before += stop - begin
-        return concatenated(found)
+        return concatenated(parts)
 
     def written(self, result_of: Callable[[History], Result], path: Path) -> Result:
         """Write all rows and the rest of the result; the result with a selection of the rows.

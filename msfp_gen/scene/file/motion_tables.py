@@ -409,25 +409,25 @@ def located(table: Mapping[str, Any], folder: Path | None, name: str = "motion")
 
     folder, errors: as of `resolved`; name: of the table.
     """
-    found = dict(table)
-    if "file" in found:
-        found["file"] = resolved(found["file"], folder, f"{name}.file")
-    if isinstance(found.get("scale_to"), Mapping):
-        found["scale_to"] = with_spectrum(found["scale_to"], folder, f"{name}.scale_to")
-    return found
+    located = dict(table)
+    if "file" in located:
+        located["file"] = resolved(located["file"], folder, f"{name}.file")
+    if isinstance(located.get("scale_to"), Mapping):
+        located["scale_to"] = with_spectrum(located["scale_to"], folder, f"{name}.scale_to")
+    return located
 
 
 def with_spectrum(target: Mapping[str, Any], folder: Path | None, name: str) -> dict[str, Any]:
     """The table of a target with the rows of its spectrum in place of the path of their file; else as of `located`."""
     from msfp_gen.motions.records.scaling import read_spectrum
 
-    found = dict(target)
-    if isinstance(found.get("spectrum"), str):
-        path = Path(str(resolved(found["spectrum"], folder, f"{name}.spectrum")))
+    located = dict(target)
+    if isinstance(located.get("spectrum"), str):
+        path = Path(str(resolved(located["spectrum"], folder, f"{name}.spectrum")))
         if not is_input(path):
             raise InputError(f"{name}.spectrum = {str(path)!r}: no such file; paths are relative to the scene file")
-        found["spectrum"] = [list(pair) for pair in read_spectrum(path)]
-    return found
+        located["spectrum"] = [list(pair) for pair in read_spectrum(path)]
+    return located
 
 
 def _resolved(file: str, folder: Path | None, name: str) -> str:
