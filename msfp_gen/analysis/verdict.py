@@ -176,12 +176,12 @@ class Verdict:
 
 def verdict_of(bearings: Iterable[BearingData], limits: Limits | None, failure: str) -> Verdict:
     """The verdict of a run. limits: of the scene; None: the defaults."""
-    given = limits or Limits()
+    allowed = limits or Limits()
     readings = [
         Reading(limit, one.number, one.label, value)
         for one in bearings
         for limit in LIMITS
-        for value in limit.read(one, given)
+        for value in limit.read(one, allowed)
     ]
     return Verdict(tuple(readings), failure)
 

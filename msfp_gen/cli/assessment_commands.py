@@ -136,7 +136,7 @@ def _bound_suite(scene: str, factors: str, output: Path | None, suite: Path, as_
     table = load_factors(factors)
     with Progress("suite") as progress:
         records = load_suite(suite, progress).records
-    scenes = {str(each.varied["record"]): each.scene for each in variations(scene, (), records)}
+    scenes = {str(variation.varied["record"]): variation.scene for variation in variations(scene, (), records)}
     for chosen in scenes.values():
         bounded_scenes(chosen, table)
     if output is not None:

@@ -152,15 +152,15 @@ def _estimate(
 
     _check(plot, None)
     try:
-        found = estimate(definition, output, **question, **engine)
+        result = estimate(definition, output, **question, **engine)
     except KeyboardInterrupt:
         note(f"what is done is kept in {output}; the same command continues")
         raise
-    answer(found.as_dict(), [estimate_table(found)], as_json)
-    for line in found.notes:
+    answer(result.as_dict(), [estimate_table(result)], as_json)
+    for line in result.notes:
         note(line)
     if plot is not None:
-        plot_estimate(found, plot)
+        plot_estimate(result, plot)
         note(f"wrote {plot}")
 
 

@@ -162,16 +162,16 @@ PROFILES = ("Peak floor acceleration", "Peak drift of the storeys", "Peak storey
 def draw_profile(row: list[Axes], result: BuildingResult) -> None:
     """Three panels over the height: accelerations of floors, drift ratios and shears of storeys, along E1 and E2."""
     floors, storeys = result.floors, result.storeys
-    heights = [each["height"] for each in floors]
+    heights = [floor["height"] for floor in floors]
     ground = np.abs(result.ground[:, 2]).max(axis=0)
     for axis in AXES:
         key, colour = f"E{axis + 1}", COLOURS[axis]
-        peaks = [each["peak_acceleration"][key] / G for each in floors]
+        peaks = [floor["peak_acceleration"][key] / G for floor in floors]
         row[0].plot(peaks, heights, marker="o", markersize=4, color=colour, label=f"E{subscript(axis + 1)}")
         row[0].plot(ground[axis] / G, heights[0], marker="x", color=colour, linestyle="none")
         if axis < 2 and storeys:
-            drifts = [100 * each["peak_drift"][key] / each["height"] for each in storeys]
-            shears = [each["peak_shear"][key] / result.scene.weight for each in storeys]
+            drifts = [100 * storey["peak_drift"][key] / storey["height"] for storey in storeys]
+            shears = [storey["peak_shear"][key] / result.scene.weight for storey in storeys]
             base = float(np.abs(result.base_reaction[:, axis]).max()) / result.scene.weight
             for axes, values in ((row[1], drifts), (row[2], shears)):
                 axes.stairs(values, heights[: len(values) + 1], orientation="horizontal", color=colour, linewidth=LINE)
@@ -185,7 +185,7 @@ def draw_profile(row: list[Axes], result: BuildingResult) -> None:
     row[2].legend(loc="best")
     for axes in row:
         axes.set_xlim(left=0.0)
-        axes.set_yticks(heights, [f"{each['name']}\n{each['height']:g}" for each in floors])
+        axes.set_yticks(heights, [f"{floor['name']}\n{floor['height']:g}" for floor in floors])
 
 
 def draw_axial_history(axes: Axes, result: BuildingResult) -> None:
@@ -211,7 +211,7 @@ def draw_axial_ranges(axes: Axes, result: BuildingResult) -> None:
     low, high = force.min(axis=0), force.max(axis=0)
     axes.barh(number, high - low, left=low, height=0.55, color=COLOURS[5], label="range")
     axes.plot(1e-3 * scene.axial_loads, number, marker="|", markersize=9, color=INK, linestyle="none", label="at rest")
-    names = [plain(each.name or str(index + 1)) for index, each in enumerate(scene.bearings)]
+    names = [plain(mount.name or str(index + 1)) for index, mount in enumerate(scene.bearings)]
     shown = number[:: max(1, len(number) // 40)]
     axes.set_yticks(shown, [names[index] for index in shown])
     axes.invert_yaxis()
@@ -239,7 +239,7 @@ def magnification(places: Array, peak: float) -> float:
     apart = float(gaps[gaps > 1e-9].min(initial=np.inf)) if len(places) > 1 else 1.0
     wanted = ORBIT * (apart if np.isfinite(apart) else 1.0) / peak if peak > 0 else 1.0
     power = 10.0 ** np.floor(np.log10(wanted))
-    return float(power * max(each for each in ROUND if each * power <= wanted * (1 + 1e-9)))
+    return float(power * max(number for number in ROUND if number * power <= wanted * (1 + 1e-9)))
 
 
 def _floor_colour(index: int) -> str:
@@ -269,8 +269,8 @@ def _spectrum(time: Array, values: Array) -> Array:
     """Pseudo-accelerations along E1, E2, E3, shape (p, 3) [m/s^2]."""
     if len(time) < 2:  # of a run that ended at its start
         return np.zeros((len(PERIODS), 3))
-    found: Any = response_spectrum(_Floor(time, values), PERIODS, damping=DAMPING)
-    psa: Array = found.psa[:, :3]
+    spectrum: Any = response_spectrum(_Floor(time, values), PERIODS, damping=DAMPING)
+    psa: Array = spectrum.psa[:, :3]
     return psa
 
 

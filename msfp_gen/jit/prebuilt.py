@@ -37,7 +37,7 @@ def prebuilt_specs() -> list[ModelSpec]:
     ]
     below = [Effects(top_rotation=True, uplift=uplift) for uplift in (False, True)]
     shaken = [*(Effects(rims=rims) for rims in (True, False)), *below]
-    heated = [ModelSpec(Layout.tfp(), replace(each, friction="pvt", bouc_wen="plastic")) for each in shaken]
+    heated = [ModelSpec(Layout.tfp(), replace(effects, friction="pvt", bouc_wen="plastic")) for effects in shaken]
     return [*alone, *(ModelSpec(layout, effects) for layout in LAYOUTS for effects in below), *heated]
 
 

@@ -112,9 +112,11 @@ class TimeGrid:
 
         end: of the run [s]. steps: longest that are permitted [s]; None: not limited.
         """
-        jumps = np.concatenate([times for each in histories for times in (each.jumps, short_pieces(each.knots))])
+        jumps = np.concatenate(
+            [times for history in histories for times in (history.jumps, short_pieces(history.knots))]
+        )
         longest = min((step for step in steps if step is not None), default=np.inf)
-        return cls.of([each.resolution for each in histories], jumps, end, longest)
+        return cls.of([history.resolution for history in histories], jumps, end, longest)
 
     @classmethod
     def of(cls, parts: Sequence[Resolution], jumps: Array, end: float, max_step: float) -> TimeGrid:

@@ -205,7 +205,12 @@ class Characterisation:
         return Table("surfaces, bottom first: least capacity left, largest velocity, heat and uplift", columns, rows)
 
     def _cycle_table(self) -> Table:
-        columns = ("cycle", "least u [mm]", "largest u [mm]", *(each.heading for each in LOOP_QUANTITIES.values()))
+        columns = (
+            "cycle",
+            "least u [mm]",
+            "largest u [mm]",
+            *(quantity.heading for quantity in LOOP_QUANTITIES.values()),
+        )
         rows = []
         for cycle in self.cycles:
             ends = (cycle.loop.displacement_least, cycle.loop.displacement_most)
@@ -279,7 +284,7 @@ def _cycle_row(cycle: Cycle) -> Row:
         "displacement_least [m]": loop.displacement_least,
         "force_most [N]": loop.force_most,
         "force_least [N]": loop.force_least,
-        **{f"{name} [{each.unit}]": loop_quantity(cycle, name) for name, each in LOOP_QUANTITIES.items()},
+        **{f"{name} [{quantity.unit}]": loop_quantity(cycle, name) for name, quantity in LOOP_QUANTITIES.items()},
         "balance_energy [J]": cycle.balance_energy,
     }
     stages = cycle.stage_stiffness().items()

@@ -42,20 +42,20 @@ def characterise(one: BearingData) -> Characterisation:
     name = one.title if one.number else one.scene.name
     largest = (float(peaks.displacement[3]), float(peaks.top_force[3]))
     demands = partial(surface_demands, one)
-    found = characterised(
+    characterisation = characterised(
         name, one.status, path, largest, load, one.bearing.gravity, history.dissipated, demands, branch
     )
-    notes = list(found.notes)
-    if any(demand.maximum_uplift is None for demand in found.surfaces):
+    notes = list(characterisation.notes)
+    if any(demand.maximum_uplift is None for demand in characterisation.surfaces):
         notes.append("uplift is not modelled in this run")
     if load is None:
         notes.append("no constant axial load: no effective period")
     if branch is None:
-        return replace(found, notes=(*notes, NOT_RECORDED))
-    monotonic, turning = not found.cycles and is_monotonic(one), path.turning
+        return replace(characterisation, notes=(*notes, NOT_RECORDED))
+    monotonic, turning = not characterisation.cycles and is_monotonic(one), path.turning
     return replace(
-        found,
-        kind="monotonic" if monotonic else found.kind,
+        characterisation,
+        kind="monotonic" if monotonic else characterisation.kind,
         first_loading=branch(turning[0], turning[1]) if len(turning) > 1 else None,
         transitions=transitions(one) if monotonic else None,
         notes=tuple(notes),
