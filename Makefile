@@ -10,7 +10,7 @@ PEERS  := $(VENV)/.peers
 # Hundreds of processes of the tests import the same modules: they are compiled once, also where images forbid it.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test slow lint types analyse package wheels processors bounds clang zig fuzz mutants figures docs clean
+.PHONY: demo test slow lint types analyse coverage package wheels processors bounds clang zig fuzz mutants figures docs clean
 
 demo: $(RUNS)
 	$(BIN)/msfp-gen demo -o out
@@ -32,6 +32,10 @@ types: $(STAMP)
 # gcc -fanalyzer, clang-tidy and cppcheck on the C code, as a compiler reads it. See docs/checks.md.
 analyse: $(STAMP)
 	$(BIN)/python tools/analyse.py
+
+# Lines of Python and C that the tests of the physics run: docs/coverage.md. Needs gcc and its gcov.
+coverage: $(STAMP)
+	$(BIN)/python benchmarks/line_coverage.py
 
 # The sdist and the wheel, each built, installed and run outside the checkout.
 package: $(STAMP)

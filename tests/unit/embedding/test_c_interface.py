@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from support import ROOT, Array, model_of
 from support.c_fuzz import KINDS, Bench
+from support.c_interface import pointer
 from support.ends import port
 from support.example import example_bearing
 
@@ -354,3 +355,33 @@ def test_a_snapshot_of_another_two_port_is_refused() -> None:
         assert word == ("ok" if name in ("same", "start") else "snapshot"), name
         b.api.port_free(other)
     b.api.port_free(first)
+
+
+def test_calls_without_a_handle_or_a_place_are_refused() -> None:
+    """They end in `argument` and read nothing at no address; the two-port that was asked goes on."""
+    b = bench_of(port().model)
+    api, scene, text = b.api, b.port_scene(), ctypes.c_char_p()
+    _, message, made = b.port(scene, 1e5)
+    assert made is not None, message
+    at, to = ctypes.addressof(scene), ctypes.addressof(text)
+    statuses = {
+        "run_new": api.run_new(at, None, to),
+        "port_new_loaded": api.port_new_loaded(at, None, to),
+        "snapshot_read": api.snapshot_read(None, None, 0),
+        "snapshot_open": api.snapshot_open(None, 0, None),
+        "port_wrench": api.port_wrench(None, None),
+        "port_wrench to no place": api.port_wrench(made, None),
+        "port_row": api.port_row(None, None),
+        "port_row to no place": api.port_row(made, None),
+        "port_snapshot_read": api.port_snapshot_read(None, None, 0),
+        "port_method": api.port_method(-1, None),
+        "port_jump": api.port_jump(None, None),
+    }
+    assert {name: api.word(status) for name, status in statuses.items()} == dict.fromkeys(statuses, "argument")
+    assert text.value == b"port: give the address of a handle"
+    assert ctypes.string_at(api.status_text(statuses["port_row"]))
+    ends, counts = np.zeros((2, 3, 6)), np.zeros(api.enums["MSFP_COUNTS"], dtype=np.int64)
+    assert api.word(api.port_trial(made, 0.01, pointer(ends), to)) == "ok"
+    api.port_counts(made, pointer(counts))
+    assert counts[api.enums["MSFP_COUNT_STEPS"]] > 0 and counts.min() >= 0
+    api.port_free(made)
