@@ -26,7 +26,7 @@ class Blocks:
     vector: Block
     moment: Block
     wrench: Block
-    local: Block
+    contact_frame: Block
     relative: Block
     friction: Block
     shear: Block
@@ -177,7 +177,7 @@ def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
         .vector("M", "N m", "moment on the body above, about its sphere centre", AXIAL)
         .vector("B", "N m", "its opposite on the body below, about the sphere centre of that body", AXIAL)
         .build(),
-        "local": new("local")
+        "contact_frame": new("contact_frame")
         .vector("p", "N", "contact force (normal and friction) in the basis of the body below", POLAR)
         .vector("dw", "rad/s", "omega'_above - omega'_below, same basis", AXIAL)
         .build(),

@@ -265,6 +265,6 @@ def to_local(b: Blocks, uplift: bool, rims: bool) -> Program:
     if rims:
         rim: Symbols = p.read(b.rim, "rim", active=("f",))
         contact = subtract(contact, rim["f"])
-    tilt = {"tilt": above["cp"] * above["ct"]} if "tilt" in b.local.quantities else {}
-    p.write(b.local, {"p": add(contact, least), "dw": relative, **tilt})
+    tilt = {"tilt": above["cp"] * above["ct"]} if "tilt" in b.contact_frame.quantities else {}
+    p.write(b.contact_frame, {"p": add(contact, least), "dw": relative, **tilt})
     return p

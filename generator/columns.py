@@ -68,7 +68,7 @@ def column_blocks(b: Blocks, planar: bool, unknowns: tuple[str, ...]) -> Columns
         twist.vector(f"t{order}", f"m{per}", "translation of the point at the origin, or its derivative", POLAR)
     variation = BlockBuilder("variation", planar)
     variation.vector("dw", "rad/s", "omega'_above - omega'_below, basis of the body below", AXIAL)
-    if "tilt" in b.local.quantities:
+    if "tilt" in b.contact_frame.quantities:
         variation.scalar("tilt", "-", "cosine of the angle between the axes of the two bodies")
     variation.vector(
         "p", "N", "variation of the interface force by rotation of the body, basis of the body below", POLAR

@@ -147,7 +147,7 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
     )
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     stage: Symbols = p.read(b.stage, "h", active=False)
-    loc: Symbols = p.read(b.local, "loc")
+    loc: Symbols = p.read(b.contact_frame, "loc")
     g: Symbols = p.read(b.shear, "g")
     f = {name: p.let(g[name] - stage["rest"] * (g[name] - stage[name])) for name in ("Y", "Z")}
     shear = Shear(f["Y"], f["Z"], (stage["Y"], stage["Z"]), stage["tau"], p.let(1 - stage["rest"]))
@@ -163,7 +163,7 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
         b.contact,
         {name: values[name] for name in b.contact.quantities},
         tangents=("M", "dY", "dZ", "N") if law is None else ("M", "dY", "dZ", "mu", "N"),
-        columns="MSFP_LOCAL",
+        columns="MSFP_FRAME_INPUTS",
     )
     p.lanes = "MSFP_LANES"
     return p

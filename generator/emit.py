@@ -248,7 +248,9 @@ def emit(
         "separations": equations.separations,
         "vectors": vector_quantities,
         "scalars": scalar_quantities,
-        "local_inputs": len(equations.blocks.local.fields) + len(equations.blocks.shear.fields) + (law is not None),
+        "frame_inputs": len(equations.blocks.contact_frame.fields)
+        + len(equations.blocks.shear.fields)
+        + (law is not None),
         "law": law,
         "flows": spec.effects.permits_quasistatic_steps,
         "heat": HEAT_KERNEL,

@@ -85,7 +85,7 @@ SYMBOLS: dict[str, dict[str, str]] = {
     "local_moment": {"M": r"M_{@,#}"},
     "relative": {"dw": r"\Delta\omega'_{@,#}"},
     "wrench": {"F": r"P_{@,#}", "M": r"M_{@,#}"},
-    "local": {"p": r"p_{@,#}", "dw": r"\Delta\omega'_{@,#}"},
+    "contact_frame": {"p": r"p_{@,#}", "dw": r"\Delta\omega'_{@,#}"},
     "friction": {"Y": r"Y_{@}", "Z": r"Z_{@}"},
     "shear": {"Y": r"g_{1@}", "Z": r"g_{2@}"},
     "before": {"Y": r"Y^{0}_{@}", "Z": r"Z^{0}_{@}", "beta": r"\beta"},
@@ -159,7 +159,7 @@ SYMBOLS: dict[str, dict[str, str]] = {
     "angular": {"r": r"\eta_{@,#}"},
 }
 # Kinds with components along the basis of the body below; all other vectors are along E_1, E_2, E_3.
-LOCAL_KINDS = {"local", "relative", "local_moment", "contact", "report_contact", "rim", "angular"}
+LOCAL_KINDS = {"contact_frame", "relative", "local_moment", "contact", "report_contact", "rim", "angular"}
 
 # Program -> alias of an argument -> number of its body or surface.
 PLACES: dict[str, dict[str, str]] = {

@@ -63,7 +63,9 @@ def _add_memory_fields(b: Blocks, memory: Memory) -> Blocks:
     source = Field("source", memory.source_unit, f"{memory.source}: source of the {memory.meaning}")
     results = [source, Field("memory", memory.unit, memory.meaning), Field("law_mu", "-", "d mu/d mu likewise")]
     if memory.where_covered:
-        b = replace(b, local=with_fields(b.local, [TILT_FIELD]), relative=with_fields(b.relative, [TILT_FIELD]))
+        b = replace(
+            b, contact_frame=with_fields(b.contact_frame, [TILT_FIELD]), relative=with_fields(b.relative, [TILT_FIELD])
+        )
     return replace(
         b,
         before=with_fields(b.before, given),
@@ -108,7 +110,7 @@ def law_results(
         par: symbols of the surface parameters.
         given: the result of `read_unknown_coefficient`.
         stage: symbols of the block `stage`.
-        loc: symbols of the block `local`.
+        loc: symbols of the block `contact_frame`.
         N: normal force.
         kept: derivative of the friction state with respect to the friction force over -mu N.
         slip: slip velocity with the velocity of plastic slip and its derivatives, of `contact.slip`.

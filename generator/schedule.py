@@ -184,7 +184,7 @@ LISTS: Mapping[str, List] = {
     "linear": List("linear", "linear", length=BODIES),
     "angular": List("angular", "angular", length=BODIES),
     "balances": List("balances", "balances", length=BODIES),
-    "local": List("local", "local", Kept.WORK, SURFACES, directions=True),
+    "contact_frame": List("contact_frame", "contact_frame", Kept.WORK, SURFACES, directions=True),
     "before": List("before", "before", length=SURFACES),
     "stage": List("stage", "stage", Kept.WORK, SURFACES, directions=True),
     "shear": List("shear", "shear", length=SURFACES),
@@ -361,12 +361,12 @@ def condensed(effects: Effects) -> Schedule:
     """
     rim, uplift = ("rim[j]",) if effects.rims else (), effects.uplift
     law = ("coefficient[j]",) if effects.law is not None else ()
-    values = "p->surface[j], w->stage[j], w->local[j], s->g[j]" + (", w->coefficient[j]" if law else "")
-    moved = "w->contact[j], d->stage[j], d->local[j], d->contact[j]"
+    values = "p->surface[j], w->stage[j], w->contact_frame[j], s->g[j]" + (", w->coefficient[j]" if law else "")
+    moved = "w->contact[j], d->stage[j], d->contact_frame[j], d->contact[j]"
     summed = Call("interface_force", ("body_parameters[j+1]", "body[j+1]", "force[j+1]"), ("force[j]",))
     contact = InC(
         "msfp_contacts(p, w, s->seed, s->g, s->jacobians ? s->jacobians->contact : NULL)",
-        "msfp_contact_tangents(w, ds->local, ds->contact)",
+        "msfp_contact_tangents(w, ds->contact_frame, ds->contact)",
         "msfp_contact_columns(p, dp, w, ds->point, ds->slopes, s->seed, ds->all, d)",
         f"for (int j = 0; j < MSFP_NB; ++j) msfp_contact_by_ends({values}, {moved})",
         fails=True,
@@ -390,7 +390,11 @@ def condensed(effects: Effects) -> Schedule:
             Pass(
                 Over.SURFACES,
                 (
-                    Call("surface_local", ("body[j]", "body[j+1]", "x[j+1]", "x[j]", "force[j]", *rim), ("local[j]",)),
+                    Call(
+                        "surface_local",
+                        ("body[j]", "body[j+1]", "x[j+1]", "x[j]", "force[j]", *rim),
+                        ("contact_frame[j]",),
+                    ),
                     STAGE,
                 ),
             ),
@@ -399,7 +403,7 @@ def condensed(effects: Effects) -> Schedule:
                 (
                     Call(
                         "contact",
-                        ("surface_parameters[j]", "stage[j]", "local[j]", "shear[j]", *law),
+                        ("surface_parameters[j]", "stage[j]", "contact_frame[j]", "shear[j]", *law),
                         ("contact[j]",),
                         contact,
                     ),

@@ -49,7 +49,7 @@ def slid_friction(b: Blocks, law: str) -> Program:
     p = Program("slid_friction", "friction after the slip of a step, (3.18) integrated in closed form")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     step: Symbols = p.read(b.slip, "s", active=False)
-    local: Symbols = p.read(b.local, "loc", active=("dw",))
+    local: Symbols = p.read(b.contact_frame, "loc", active=("dw",))
     per_turn = p.let(-par["sign"] * par["R"] / par["dy"])  # (3.19); in the plane the contact position does not enter
     rate = p.let(per_turn * local["dw"][1])
     Y, _ = _after_slip(p, is_plastic(law), step["Y"], p.let(step["beta"] * rate + per_turn * step["turn"]))

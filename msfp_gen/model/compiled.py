@@ -41,9 +41,9 @@ class Stack(Protocol):
         f: Array,
         base: Array,
         load: Array,
-        cq: float,
-        cv: float,
-        ca: float,
+        q_weight: float,
+        v_weight: float,
+        a_weight: float,
         beta: float,
         **state: Array,
     ) -> tuple[str, Array, Array, Array]:

@@ -105,7 +105,7 @@ typedef struct {
 /* Derivatives of q, v, a with respect to the unknowns of a step (the columns of the tangent), and the stage formula
  * of the friction state f = (Y, Z), f = fp + beta df/dt; beta = 0 keeps f = fp. */
 typedef struct {
-    double cq, cv, ca;
+    double q_weight, v_weight, a_weight;
     double beta;           /* [s] */
     double accuracy;       /* of Y, Z [-]; 0: to rounding */
     double fp[MSFP_NB][2]; /* [-] */
@@ -122,7 +122,8 @@ typedef struct {
 #define MSFP_CONTACT_ROWS (MSFP_MOMENT_SIZE + 1 + MSFP_GRADIENTS * MSFP_SURFACE_RATES)
 /* Jacobians of all surfaces with respect to their inputs: of the contacts, lane by lane; of the rims. */
 typedef struct {
-    double contact[MSFP_CONTACT_ROWS * MSFP_LOCAL_SIZE * MSFP_LANES], rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
+    double contact[MSFP_CONTACT_ROWS * MSFP_CONTACT_FRAME_SIZE * MSFP_LANES],
+        rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
 } msfp_surface_jacobians;
 
 /* Results of one evaluation, with tangents [field][column]. Blocks as in msfp_model.h. */
@@ -130,7 +131,7 @@ typedef struct {
     double x[MSFP_NB + 1][MSFP_COORDINATES_SIZE];
     double body[MSFP_NB + 1][MSFP_BODY_SIZE];
     double force[MSFP_NB + 1][MSFP_FORCE_SIZE], moment[MSFP_NB + 1][MSFP_MOMENT_SIZE];
-    double local[MSFP_NB][MSFP_LOCAL_SIZE];
+    double contact_frame[MSFP_NB][MSFP_CONTACT_FRAME_SIZE];
     double stage[MSFP_NB][MSFP_STAGE_SIZE], contact[MSFP_NB][MSFP_CONTACT_SIZE];
     double rim[MSFP_NB][MSFP_RIM_SIZE];
     int rim_active[MSFP_NB]; /* whether the rim pushes */

@@ -323,11 +323,12 @@ typedef struct msfp_api {
      * in_tension: surface, from 1, that would have to transmit tension, 0: none. */
     int (*observe)(const msfp_bearing *bearing, const msfp_inputs *at, double *row, double *powers, double *rates,
                    int *in_tension);
-    /* Residual [dof] and tangent [dof][dof] of the condensed equations in a stage of an implicit method, q = Q + cq x,
-     * v = V + cv x, a = A + ca x. at->f: fp of the stage formula f = fp + beta df/dt, beta [s]; found [nb][2]: Y, Z.
+    /* Residual [dof] and tangent [dof][dof] of the condensed equations in a stage of an implicit method: q = Q +
+     * q_weight x, v = V + v_weight x, a = A + a_weight x. at->f: fp of the stage formula f = fp + beta df/dt, beta [s];
+     * found [nb][2]: Y, Z.
      * at->foot: y - beta^2 y'', y' - beta y''; gain: a memory is its start + at->memory + gain * source. */
-    int (*condensed)(const msfp_bearing *bearing, const msfp_inputs *at, double cq, double cv, double ca, double beta,
-                     double gain, double *residual, double *tangent, double *found);
+    int (*condensed)(const msfp_bearing *bearing, const msfp_inputs *at, double q_weight, double v_weight,
+                     double a_weight, double beta, double gain, double *residual, double *tangent, double *found);
     /* Residual [unknowns] of the momentum balances [N], [N m] at given unknowns, body by body: linear, angular. jacobian
      * [unknowns][count], of the rates of Y, Z [2 nb][count]. */
     int (*momentum_balances)(const msfp_bearing *bearing, const msfp_inputs *at, const double *unknowns,

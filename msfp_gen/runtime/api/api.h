@@ -41,8 +41,8 @@ int msfp_api_accelerations(const msfp_bearing *bearing, const msfp_inputs *at, i
                            double *rates, double *unknowns, msfp_convergence *how);
 int msfp_api_observe(const msfp_bearing *bearing, const msfp_inputs *at, double *row, double *powers, double *rates,
                      int *in_tension);
-int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, double cq, double cv, double ca,
-                       double beta, double gain, double *residual, double *tangent, double *found);
+int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, double q_weight, double v_weight,
+                       double a_weight, double beta, double gain, double *residual, double *tangent, double *found);
 int msfp_api_momentum_balances(const msfp_bearing *bearing, const msfp_inputs *at, const double *unknowns,
                                const msfp_variable *variables, int count, double *residual, double *jacobian,
                                double *rates);

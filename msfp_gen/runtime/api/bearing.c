@@ -136,14 +136,14 @@ int msfp_api_observe(const msfp_bearing *bearing, const msfp_inputs *at, double 
     return status;
 }
 
-int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, double cq, double cv, double ca,
-                       double beta, double gain, double *residual, double *tangent, double *found)
+int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, double q_weight, double v_weight,
+                       double a_weight, double beta, double gain, double *residual, double *tangent, double *found)
 {
     msfp_point point;
     msfp_work w;
     msfp_seed seed = { 0 };
     double g[NB][2], rest[MSFP_DOF];
-    const double factors[] = { cq, cv, ca, beta, gain };
+    const double factors[] = { q_weight, v_weight, a_weight, beta, gain };
     int status = point_of(bearing, at, &point);
     if (status == MSFP_OK && !msfp_all_finite(factors, sizeof factors / sizeof *factors))
         status = MSFP_E_FINITE;
@@ -156,7 +156,7 @@ int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, doubl
     point.gain = gain;
 #endif
     point.foot_beta = beta;
-    seed.cq = cq, seed.cv = cv, seed.ca = ca, seed.beta = beta;
+    seed.q_weight = q_weight, seed.v_weight = v_weight, seed.a_weight = a_weight, seed.beta = beta;
     memcpy(seed.fp, point.f, sizeof seed.fp);
     memcpy(g, point.f, sizeof g);
     status = msfp_condensed(&bearing->parameters, &point, &seed, &w, g, residual ? residual : rest, tangent);

@@ -53,7 +53,7 @@ int msfp_api_port_wrench(const msfp_port *port, double *wrench)
 
 static int check_direction(const msfp_port *port, const double *direction)
 {
-    if (!port || !direction || !port->tried)
+    if (!port || !direction || port->trial_state != TRIAL_SOLVED)
         return MSFP_E_ARGUMENT;
     if (!msfp_all_finite(direction, MSFP_ORDERS))
         return MSFP_E_FINITE;

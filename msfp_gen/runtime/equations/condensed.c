@@ -74,7 +74,7 @@ int msfp_surface_in_tension(const msfp_work *w)
 {
     for (int j = 0; j < NB && !MSFP_UPLIFT; ++j) {
         double p[3];
-        msfp_local_p_get(w->local[j], p);
+        msfp_contact_frame_p_get(w->contact_frame[j], p);
         if (p[2] <= 0.0)
             return j + 1;
     }
@@ -130,7 +130,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
 {
     double residual[DOF], tangent[DOF * DOF], g[NB][2], last = INFINITY;
     int pivots[DOF], worst;
-    msfp_seed seed = { .ca = 1.0 };
+    msfp_seed seed = { .a_weight = 1.0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     memcpy(g, at->f, sizeof g);
     out->determinant = 1;

@@ -16,10 +16,11 @@
 enum {
     LANES = MSFP_LANES,
     FRICTION = MSFP_SHEAR_SIZE,
-    UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns: g, and mu where it follows a law */
-    ROWS = MOMENT + UNKNOWNS + 1,   /* of the Jacobian of a contact: M, dY, dZ, mu, N */
-    INPUTS = MSFP_LOCAL_SIZE,       /* force and slip rotation */
-    SOURCE = MSFP_CONTACT_ROWS - MSFP_GRADIENTS * (MSFP_MEMORY > 0) /* the row of the source of a memory, where there is one */
+    UNKNOWNS = FRICTION + MSFP_LAW,   /* local unknowns: g, and mu where it follows a law */
+    ROWS = MOMENT + UNKNOWNS + 1,     /* of the Jacobian of a contact: M, dY, dZ, mu, N */
+    INPUTS = MSFP_CONTACT_FRAME_SIZE, /* force and slip rotation */
+    SOURCE = MSFP_CONTACT_ROWS -
+             MSFP_GRADIENTS * (MSFP_MEMORY > 0) /* the row of the source of a memory, where there is one */
 };
 #if MSFP_MEMORY
 #define SLOPE(out, s)                                                                                                  \
@@ -30,7 +31,8 @@ enum {
 
 /* Fields of all surfaces, [field][lane]; spare lanes repeat the last surface. */
 typedef struct {
-    double local[INPUTS * LANES], stage[MSFP_STAGE_SIZE * LANES], g[FRICTION * LANES], out[MSFP_CONTACT_SIZE * LANES];
+    double contact_frame[INPUTS * LANES], stage[MSFP_STAGE_SIZE * LANES], g[FRICTION * LANES],
+        out[MSFP_CONTACT_SIZE * LANES];
 #if MSFP_LAW
     double x[MSFP_COEFFICIENT_SIZE * LANES];
 #endif
@@ -42,7 +44,7 @@ MSFP_INLINE void gather(const msfp_work *w, double g[NB][2], lanes *all)
     for (int s = 0; s < LANES; ++s) {
         const int j = s < NB ? s : NB - 1;
         for (int k = 0; k < INPUTS; ++k)
-            all->local[k * LANES + s] = w->local[j][k];
+            all->contact_frame[k * LANES + s] = w->contact_frame[j][k];
         for (int k = 0; k < FRICTION; ++k)
             all->g[k * LANES + s] = g[j][k];
         for (int k = 0; k < MSFP_STAGE_SIZE; ++k)
@@ -147,7 +149,7 @@ MSFP_INLINE int friction_stage(const double *par, lanes *all, double beta, doubl
     for (int s = 0; s < LANES; ++s)
         best[s] = INFINITY;
     for (int i = 0; i < 60; ++i) {
-        msfp_contact_lanes(par, all->stage, all->local, all->g MSFP_IF_LAW(all->x), all->out);
+        msfp_contact_lanes(par, all->stage, all->contact_frame, all->g MSFP_IF_LAW(all->x), all->out);
         const int unconverged = newton_step(all, beta, accuracy, step, best);
         if (unconverged <= 0)
             return unconverged == 0 ? MSFP_OK : i == 0 ? MSFP_E_FINITE : MSFP_E_NEWTON;
@@ -164,16 +166,16 @@ MSFP_INLINE int jacobian_row(int r) { return r < MOMENT ? r : r == MOMENT ? MOME
 MSFP_INLINE int closed_form_stage(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, lanes *all,
                                   double *slope)
 {
-    static const double unit[INPUTS] = { [MSFP_LOCAL_DWY] = 1.0 };
+    static const double unit[INPUTS] = { [MSFP_CONTACT_FRAME_DWY] = 1.0 };
     double finite = 0.0;
     for (int s = 0; s < LANES; ++s) {
         const int j = s < NB ? s : NB - 1;
         double slid[MSFP_SLID_SIZE], slopes[MSFP_SLID_SIZE];
         if (slope) {
-            msfp_slid_friction_tangent(p->surface[j], seed->slip[j], w->local[j], slid, unit, slopes);
+            msfp_slid_friction_tangent(p->surface[j], seed->slip[j], w->contact_frame[j], slid, unit, slopes);
             slope[s] = slopes[MSFP_SLID_G];
         } else
-            msfp_slid_friction(p->surface[j], seed->slip[j], w->local[j], slid);
+            msfp_slid_friction(p->surface[j], seed->slip[j], w->contact_frame[j], slid);
         all->g[s] = slid[MSFP_SLID_G];
         w->stage[j][MSFP_STAGE_Y] = slid[MSFP_SLID_Y]; /* the kernel leaves Y as it is, and gives its rate */
         w->stage[j][MSFP_STAGE_TAU] = p->surface[j][MSFP_SURFACE_PARAMETERS_TD];
@@ -182,7 +184,7 @@ MSFP_INLINE int closed_form_stage(const msfp_parameters *p, msfp_work *w, const 
             all->stage[k * LANES + s] = w->stage[j][k];
         finite += slid[MSFP_SLID_Y];
     }
-    msfp_contact_lanes(&p->lanes[0][0], all->stage, all->local, all->g, all->out);
+    msfp_contact_lanes(&p->lanes[0][0], all->stage, all->contact_frame, all->g, all->out);
     return finite < INFINITY && finite > -INFINITY ? MSFP_OK : MSFP_E_FINITE;
 }
 
@@ -203,14 +205,14 @@ void msfp_work_of_slip(const double *par, const double *slip, const double *end,
 /* As `condense`, with Y a function of the slip of the step. */
 MSFP_INLINE void condense_closed_form(const double *par, lanes *all, const double *slope, double *condensed)
 {
-    double jacobian[ROWS * MSFP_LOCAL * LANES];
-    msfp_contact_jacobian(par, all->stage, all->local, all->g, all->out, jacobian);
+    double jacobian[ROWS * MSFP_FRAME_INPUTS * LANES];
+    msfp_contact_jacobian(par, all->stage, all->contact_frame, all->g, all->out, jacobian);
     for (int r = 0; r < MSFP_CONTACT_ROWS; ++r) {
-        const double *row = jacobian + jacobian_row(r) * MSFP_LOCAL * LANES;
+        const double *row = jacobian + jacobian_row(r) * MSFP_FRAME_INPUTS * LANES;
         for (int k = 0; k < INPUTS; ++k)
             for (int s = 0; s < LANES; ++s)
                 condensed[(r * INPUTS + k) * LANES + s] =
-                    row[k * LANES + s] + (k == MSFP_LOCAL_DWY ? row[INPUTS * LANES + s] * slope[s] : 0.0);
+                    row[k * LANES + s] + (k == MSFP_CONTACT_FRAME_DWY ? row[INPUTS * LANES + s] * slope[s] : 0.0);
     }
 }
 #endif
@@ -219,12 +221,12 @@ MSFP_INLINE void condense_closed_form(const double *par, lanes *all, const doubl
  * unknowns is close to the identity plus a dissipative part, so that elimination needs no pivots. */
 MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
 {
-    double jacobian[ROWS * MSFP_LOCAL * LANES], a[UNKNOWNS][UNKNOWNS + INPUTS][LANES];
-    msfp_contact_jacobian(par, all->stage, all->local, all->g MSFP_IF_LAW(all->x), all->out, jacobian);
+    double jacobian[ROWS * MSFP_FRAME_INPUTS * LANES], a[UNKNOWNS][UNKNOWNS + INPUTS][LANES];
+    msfp_contact_jacobian(par, all->stage, all->contact_frame, all->g MSFP_IF_LAW(all->x), all->out, jacobian);
     for (int r = 0; r < UNKNOWNS; ++r)
         for (int c = 0; c < UNKNOWNS + INPUTS; ++c) {
             const double *from =
-                jacobian + ((MOMENT + r) * MSFP_LOCAL + (c < UNKNOWNS ? INPUTS + c : c - UNKNOWNS)) * LANES;
+                jacobian + ((MOMENT + r) * MSFP_FRAME_INPUTS + (c < UNKNOWNS ? INPUTS + c : c - UNKNOWNS)) * LANES;
             for (int s = 0; s < LANES; ++s) {
                 const double scaled = (r < FRICTION ? all->stage[MSFP_STAGE_TAU * LANES + s] : 1.0) * from[s];
                 a[r][c][s] = c < UNKNOWNS ? (r == c) - scaled : scaled;
@@ -242,7 +244,7 @@ MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
     /* Of the source of a memory only gradients need derivatives (msfp_tangent_with_slopes). */
     memset(condensed + SOURCE * INPUTS * LANES, 0, (MSFP_CONTACT_ROWS - SOURCE) * INPUTS * LANES * sizeof *condensed);
     for (int r = 0; r < SOURCE; ++r) {
-        const double *row = jacobian + jacobian_row(r) * MSFP_LOCAL * LANES;
+        const double *row = jacobian + jacobian_row(r) * MSFP_FRAME_INPUTS * LANES;
         for (int k = 0; k < INPUTS; ++k) {
             double *sum = condensed + (r * INPUTS + k) * LANES;
             for (int s = 0; s < LANES; ++s)

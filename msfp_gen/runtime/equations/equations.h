@@ -111,7 +111,7 @@ int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed,
                   double *condensed);
 /* Columns of the moments and of N from those of the inputs of the contacts, by that Jacobian, which is in `w`; in models
  * with gradients also `drates` of `w`. */
-void msfp_contact_tangents(msfp_work *w, double dlocal[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_DOF],
+void msfp_contact_tangents(msfp_work *w, double dlocal[MSFP_NB][MSFP_CONTACT_FRAME_SIZE * MSFP_DOF],
                            double dcontact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_DOF]);
 #if MSFP_CLOSED_FORM
 /* Y after the body above has turned by `turn` [rad]. par: of the surface. */

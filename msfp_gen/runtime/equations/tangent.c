@@ -17,12 +17,12 @@ enum { LANES = MSFP_LANES };
 enum {
     TWIST = MSFP_TWIST_SIZE,
     VARIATION = MSFP_VARIATION_SIZE,
-    VARIATION_P = MSFP_LOCAL_SIZE - FORCE,
+    VARIATION_P = MSFP_CONTACT_FRAME_SIZE - FORCE,
     VARIATION_F = VARIATION_P + FORCE,
     VARIATION_M = VARIATION_F + FORCE,
     VARIATION_WP = VARIATION_M + MOMENT
 };
-enum { INPUTS = MSFP_LOCAL_SIZE };
+enum { INPUTS = MSFP_CONTACT_FRAME_SIZE };
 #if MSFP_GRADIENTS
 #define RATE_ROW(w, j, i) (w)->drates[j][i]
 #else
@@ -100,7 +100,7 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_point *at, const msfp_
 #else
     add_variation(w->dbody[NB] + MSFP_BODY_WPX * DOF, NB, variation, VARIATION_WP, MOMENT);
     add_variation(w->dbody[NB] + MSFP_BODY_ALPX * DOF, NB, variation, VARIATION_WP + MOMENT, MOMENT);
-    w->dx[NB][MSFP_COORDINATES_PHI * DOF + DOF - 1] = seed->cq;
+    w->dx[NB][MSFP_COORDINATES_PHI * DOF + DOF - 1] = seed->q_weight;
 #endif
     msfp_top_tangent(p, at, w);
     msfp_transported_wrench_tangent(w->body[NB], no_twist, w->force[NB], w->moment[NB], wrench, c->twist, w->dforce[NB],
@@ -114,7 +114,7 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_point *at, const msfp_
 MSFP_INLINE void local_inputs(const msfp_work *w, const msfp_seed *seed, const double *rim, int j,
                               const double *variation, double *inputs)
 {
-    const double factors[2] = { seed->cq, seed->cv };
+    const double factors[2] = { seed->q_weight, seed->v_weight };
     for (int k = 0; k < INPUTS; ++k)
         for (int i = 0; i < ND; ++i)
             inputs[(k * ND + i) * LANES + j] = variation[i * VARIATION + (k < FORCE ? VARIATION_P + k : k - FORCE)];
@@ -145,7 +145,7 @@ MSFP_INLINE void local_parts(const msfp_work *w, const msfp_seed *seed, double v
 
 /* Columns of one result of the contact of surface j, from those of its force and `part`, that of local_parts. */
 MSFP_INLINE void contact_row(const double *restrict slope, const double *restrict local, int j,
-                             const double *restrict part, double cv, double *restrict row)
+                             const double *restrict part, double v_weight, double *restrict row)
 {
     for (int c = 0; c < DOF; ++c) {
         double sum = 0.0;
@@ -156,10 +156,10 @@ MSFP_INLINE void contact_row(const double *restrict slope, const double *restric
     for (int i = 0; i < ND; ++i)
         row[j * ND + i] += part[i * LANES];
 #if MSFP_SPIN_LOCKED
-    (void)cv;
+    (void)v_weight;
 #else
     if (j > 0) /* spin of the body below */
-        row[j * ND - 1] -= slope[MSFP_LOCAL_DWZ * LANES] * cv;
+        row[j * ND - 1] -= slope[MSFP_CONTACT_FRAME_DWZ * LANES] * v_weight;
 #endif
 }
 
@@ -167,10 +167,10 @@ MSFP_INLINE void contact_row(const double *restrict slope, const double *restric
 MSFP_INLINE void surface(msfp_work *w, const msfp_seed *seed, int j, const double *parts, columns *c)
 {
     double unused[FORCE], local[FORCE * DOF];
-    const double *rim = w->jacobians.rim[j], factors[2] = { seed->cq, seed->cv };
+    const double *rim = w->jacobians.rim[j], factors[2] = { seed->q_weight, seed->v_weight };
     msfp_force_to_local_tangent(w->body[j], w->force[j], unused, c->below, local);
     for (int r = 0; r < MSFP_CONTACT_ROWS; ++r)
-        contact_row(w->jacobians.contact + r * INPUTS * LANES + j, local, j, parts + r * ND * LANES + j, seed->cv,
+        contact_row(w->jacobians.contact + r * INPUTS * LANES + j, local, j, parts + r * ND * LANES + j, seed->v_weight,
                     r < MOMENT    ? c->moment_below + r * DOF
                     : r == MOMENT ? w->dnormal[j]
                                   : RATE_ROW(w, j, r - MOMENT - 1));
@@ -245,7 +245,7 @@ MSFP_WIDE void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const d
 MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                             double *tangent)
 {
-    const double factors[MSFP_SEED_SIZE] = { seed->cq, seed->cv, seed->ca };
+    const double factors[MSFP_SEED_SIZE] = { seed->q_weight, seed->v_weight, seed->a_weight };
     double variation[NB + 1][ND * VARIATION], moment[MOMENT];
     columns c;
     twists(w, factors, c.twist);

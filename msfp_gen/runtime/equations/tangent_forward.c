@@ -40,7 +40,7 @@ void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const double *dfo
 MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                             double *tangent)
 {
-    const double factors[3] = { seed->cq, seed->cv, seed->ca };
+    const double factors[3] = { seed->q_weight, seed->v_weight, seed->a_weight };
     msfp_blocks s;
     memset(w->dx, 0, sizeof w->dx);
     memset(w->dbody[0], 0, sizeof w->dbody[0]);

@@ -18,17 +18,17 @@ static int end_is_recorded(const msfp_run *run)
 /* Factored tangents of the stages of the step, at the evaluations that solved them. */
 static int factorise(msfp_run *run)
 {
-    msfp_trail *trail = &run->gradients->trail;
+    msfp_stage_history *stage_history = &run->gradients->stage_history;
     const int last = msfp_last_stage(run), energies = run->gradients->energies;
-    trail->all_slopes = energies || end_is_recorded(run);
+    stage_history->all_slopes = energies || end_is_recorded(run);
     for (int i = 1; i <= last; ++i) {
-        msfp_stage *s = &trail->stage[i];
-        const int status =
-            msfp_tangent_with_slopes(&run->parameters, &s->at, &s->seed, &trail->work[i], s->g,
-                                     energies || (i == last && trail->all_slopes), &trail->slopes[i], trail->factors[i]);
+        msfp_stage *s = &stage_history->stage[i];
+        const int status = msfp_tangent_with_slopes(&run->parameters, &s->at, &s->seed, &stage_history->work[i], s->g,
+                                                    energies || (i == last && stage_history->all_slopes),
+                                                    &stage_history->slopes[i], stage_history->factors[i]);
         if (status)
             return status;
-        if (msfp_lu(trail->factors[i], DOF, trail->pivots[i]) == 0)
+        if (msfp_lu(stage_history->factors[i], DOF, stage_history->pivots[i]) == 0)
             return MSFP_E_IRREGULAR;
     }
     return MSFP_OK;
@@ -86,7 +86,7 @@ static double event_at_end(msfp_run *run, int kind, int j, double *rate)
     return value;
 }
 
-void msfp_event_time_columns(msfp_run *run, msfp_group *group, int kind, int j, double *dt)
+void msfp_event_time_columns(msfp_run *run, msfp_parameter_batch *batch, int kind, int j, double *dt)
 {
     msfp_columns value;
     msfp_point at;
@@ -94,22 +94,22 @@ void msfp_event_time_columns(msfp_run *run, msfp_group *group, int kind, int j, 
     double rate;
     memset(&dat, 0, sizeof dat);
     msfp_to_point(run, &run->next, &at);
-    msfp_inputs_columns(run, group, run->next.t, group->next.t, &dat);
-    memcpy(dat.q, group->next.q, sizeof dat.q);
-    memcpy(dat.v, group->next.v, sizeof dat.v);
-    msfp_event_columns(&run->parameters, &group->parameters, &at, &dat, kind, j, value);
+    msfp_inputs_columns(run, batch, run->next.t, batch->next.t, &dat);
+    memcpy(dat.q, batch->next.q, sizeof dat.q);
+    memcpy(dat.v, batch->next.v, sizeof dat.v);
+    msfp_event_columns(&run->parameters, &batch->parameters, &at, &dat, kind, j, value);
     event_at_end(run, kind, j, &rate);
     for (int c = 0; c < C; ++c)
         dt[c] = rate != 0.0 ? -value[c] / rate : 0.0;
 }
 
-/* Columns of the state at the end of the step, whose length has the columns group->h. */
-static void step_columns(msfp_run *run, msfp_group *group)
+/* Columns of the state at the end of the step, whose length has the columns batch->h. */
+static void step_columns(msfp_run *run, msfp_parameter_batch *batch)
 {
-    group->end_known = 0;
-    msfp_step_columns(run, group);
+    batch->end_known = 0;
+    msfp_step_columns(run, batch);
     for (int c = 0; c < C; ++c)
-        group->next.t[c] = group->now.t[c] + group->h[c];
+        batch->next.t[c] = batch->now.t[c] + batch->h[c];
 }
 
 /* Columns of the accepted step, and of the rows inside it. rim: the surface whose rim is met or left at its end, -1:
@@ -120,24 +120,24 @@ static int accepted_columns(msfp_run *run, int rim, int fixed)
     int status = factorise(run);
     if (status)
         return status;
-    for (int i = 0; i < g->groups; ++i) {
+    for (int i = 0; i < g->batches; ++i) {
         for (int c = 0; c < C; ++c)
-            g->group[i].h[c] = fixed ? -g->group[i].now.t[c] : 0.0;
-        step_columns(run, &g->group[i]);
+            g->batch[i].h[c] = fixed ? -g->batch[i].now.t[c] : 0.0;
+        step_columns(run, &g->batch[i]);
     }
     if (run->row_count > g->row_count)
         status = msfp_record_rows_columns(run);
-    for (int i = 0; i < g->groups && rim >= 0; ++i) {
+    for (int i = 0; i < g->batches && rim >= 0; ++i) {
         msfp_columns dt;
-        msfp_event_time_columns(run, &g->group[i], MSFP_EVENT_RIM_CONTACT, rim, dt);
-        msfp_add_columns(&g->group[i].h, (const msfp_columns *)&dt, 1.0, 1);
-        step_columns(run, &g->group[i]);
+        msfp_event_time_columns(run, &g->batch[i], MSFP_EVENT_RIM_CONTACT, rim, dt);
+        msfp_add_columns(&g->batch[i].h, (const msfp_columns *)&dt, 1.0, 1);
+        step_columns(run, &g->batch[i]);
     }
     return status;
 }
 
 /* Take the step once more, to where the gap of rim j is zero while the contact is as it was before: without this rim,
- * or with a rim that holds the slider. Into run->next and the trail; returns a status. */
+ * or with a rim that holds the slider. Into run->next and the stage history; returns a status. */
 static int take_step_to_event(msfp_run *run, int j, int meets)
 {
     const double tolerance = 1e-9 * run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_SC];
@@ -196,8 +196,8 @@ int msfp_gradients_step(msfp_run *run, const double *before, const double *after
     int status = rim < 0 ? accepted_columns(run, rim, fixed) : columns_to_event(run, rim, fixed, before[rim] > 0.0);
     if (!status)
         status = msfp_record_extremes_columns(run);
-    for (int i = 0; i < g->groups && rim >= 0; ++i)
-        g->group[i].end_known = 0; /* the next step starts after the event */
+    for (int i = 0; i < g->batches && rim >= 0; ++i)
+        g->batch[i].end_known = 0; /* the next step starts after the event */
     return status;
 }
 #endif

@@ -74,7 +74,7 @@ MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, dou
 MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
                                 const double g[MSFP_NB][2], int rows, msfp_slopes *slopes)
 {
-    double stage[MSFP_STAGE_SIZE * LANES], local[MSFP_LOCAL_SIZE * LANES], force[FRICTION * LANES];
+    double stage[MSFP_STAGE_SIZE * LANES], contact_frame[MSFP_CONTACT_FRAME_SIZE * LANES], force[FRICTION * LANES];
     double out[MSFP_CONTACT_SIZE * LANES], jacobian[RESULTS][INPUTS][LANES];
 #if MSFP_LAW
     double x[MSFP_COEFFICIENT_SIZE * LANES];
@@ -83,8 +83,8 @@ MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_seed *seed,
         const int j = s < MSFP_NB ? s : MSFP_NB - 1;
         for (int i = 0; i < MSFP_STAGE_SIZE; ++i)
             stage[i * LANES + s] = w->stage[j][i];
-        for (int i = 0; i < MSFP_LOCAL_SIZE; ++i)
-            local[i * LANES + s] = w->local[j][i];
+        for (int i = 0; i < MSFP_CONTACT_FRAME_SIZE; ++i)
+            contact_frame[i * LANES + s] = w->contact_frame[j][i];
         for (int i = 0; i < FRICTION; ++i)
             force[i * LANES + s] = g[j][i];
 #if MSFP_LAW
@@ -92,7 +92,8 @@ MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_seed *seed,
             x[i * LANES + s] = w->coefficient[j][i];
 #endif
     }
-    msfp_contact_by_inputs_jacobian(&p->lanes[0][0], stage, local, force MSFP_IF_LAW(x), out, &jacobian[0][0][0]);
+    msfp_contact_by_inputs_jacobian(&p->lanes[0][0], stage, contact_frame, force MSFP_IF_LAW(x), out,
+                                    &jacobian[0][0][0]);
 #if MSFP_CLOSED_FORM
     if (seed->closed_form) {
         memcpy(slopes->of, jacobian, (size_t)rows * sizeof *jacobian);
@@ -116,7 +117,7 @@ MSFP_COLUMNWISE void msfp_contact_slopes(const msfp_parameters *p, const msfp_se
 int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                              double g[MSFP_NB][2], int all, msfp_slopes *slopes, double *tangent)
 {
-    enum { SIZE = MSFP_LOCAL_SIZE * LANES };
+    enum { SIZE = MSFP_CONTACT_FRAME_SIZE * LANES };
     int closed_form = 0;
 #if MSFP_CLOSED_FORM
     closed_form = seed->closed_form;
@@ -137,7 +138,8 @@ int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, con
 #endif
     }
     for (int r = 0; r < MSFP_CONTACT_ROWS && !closed_form; ++r)
-        memcpy(w->jacobians.contact + r * SIZE, slopes->of[from[r]][GIVEN - MSFP_LOCAL_SIZE], SIZE * sizeof(double));
+        memcpy(w->jacobians.contact + r * SIZE, slopes->of[from[r]][GIVEN - MSFP_CONTACT_FRAME_SIZE],
+               SIZE * sizeof(double));
     msfp_tangent(p, at, seed, w, tangent);
     return MSFP_OK;
 }
@@ -162,7 +164,7 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
                                  int rows, msfp_work_columns *d)
 {
     double *dstage = d->stage[j], unknowns[UNKNOWNS * C];
-    const double *const blocks[] = { dp->surface[j], dstage, d->local[j], unknowns, unknowns + FRICTION * C },
+    const double *const blocks[] = { dp->surface[j], dstage, d->contact_frame[j], unknowns, unknowns + FRICTION * C },
                         *inputs[INPUTS];
     MSFP_UNROLL
     for (int i = 0; i < INPUTS; ++i)
@@ -170,8 +172,8 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
 #if MSFP_CLOSED_FORM
     if (seed->closed_form) {
         double dslid[MSFP_SLID_SIZE * C];
-        msfp_slid_friction_direction(p->surface[j], seed->slip[j], w->local[j], dp->surface[j], dat->slip[j],
-                                     d->local[j], dslid);
+        msfp_slid_friction_direction(p->surface[j], seed->slip[j], w->contact_frame[j], dp->surface[j], dat->slip[j],
+                                     d->contact_frame[j], dslid);
         memset(dstage, 0, sizeof d->stage[j]);
         memcpy(dstage + MSFP_STAGE_Y * C, dslid + MSFP_SLID_Y * C, sizeof(msfp_columns));
         memcpy(dstage + MSFP_STAGE_TAU * C, dp->surface[j] + MSFP_SURFACE_PARAMETERS_TD * C, sizeof(msfp_columns));

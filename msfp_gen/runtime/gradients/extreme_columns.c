@@ -23,8 +23,8 @@ static void magnitudes(const double u[3], msfp_columns *const du, size_t first, 
 }
 
 /* What a row contributes to the extremes; positions: only what follows from positions, NAN elsewhere. */
-static void contributions(const msfp_run *run, const msfp_group *group, const msfp_row *row, const msfp_row_columns d,
-                          int positions, double *value, msfp_columns *columns)
+static void contributions(const msfp_run *run, const msfp_parameter_batch *batch, const msfp_row *row,
+                          const msfp_row_columns d, int positions, double *value, msfp_columns *columns)
 {
     double across[3];
     msfp_columns dacross[3], dslip[3] = { 0 };
@@ -33,7 +33,7 @@ static void contributions(const msfp_run *run, const msfp_group *group, const ms
     msfp_displacement_across(run, row, across);
     for (int i = 0; i < 3; ++i)
         for (int c = 0; c < C; ++c)
-            dacross[i][c] = d[MSFP_ROW_BASE + i][c] - d[MSFP_ROW_TOP + i][c] - group->start[i][c];
+            dacross[i][c] = d[MSFP_ROW_BASE + i][c] - d[MSFP_ROW_TOP + i][c] - batch->start[i][c];
     magnitudes(across, dacross, EXTREME(displacement), value, columns);
     for (int j = 0; j < NB; ++j) {
         value[EXTREME(sliding) + j] = row->sliding[j];
@@ -68,13 +68,14 @@ static void contributions(const msfp_run *run, const msfp_group *group, const ms
 }
 
 /* Take the columns of the extremes that a row gave: changed[i] is then 0. Returns how many remain. */
-static int take(const msfp_run *run, msfp_group *group, const double *value, msfp_columns *columns, int *changed)
+static int take(const msfp_run *run, msfp_parameter_batch *batch, const double *value, msfp_columns *columns,
+                int *changed)
 {
     const double *now = (const double *)&run->extremes;
     int left = 0;
     for (int i = 0; i < EXTREMES; ++i) {
         if (changed[i] && fabs(now[i] - value[i]) <= 1e-13 * fabs(now[i])) {
-            memcpy(group->extremes[i], columns[i], sizeof *columns);
+            memcpy(batch->extremes[i], columns[i], sizeof *columns);
             changed[i] = 0;
         }
         left += changed[i];
@@ -90,21 +91,21 @@ static double turning_share(const msfp_run *run)
 }
 
 /* As take_nodes of extremes.c, at one node. Returns how many remain. */
-static int take_node(msfp_run *run, msfp_group *group, int node, int *changed)
+static int take_node(msfp_run *run, msfp_parameter_batch *batch, int node, int *changed)
 {
     msfp_recording *s = &run->gradients->recording;
     double value[EXTREMES], force[EXTREMES];
     msfp_row row;
     msfp_row_inside(run, run->node[node].share, &row);
-    msfp_row_between_columns(run, group, run->node[node].share, 0, s->row);
-    contributions(run, group, &row, (const msfp_columns *)s->row, 0, value, s->contributed);
+    msfp_row_between_columns(run, batch, run->node[node].share, 0, s->row);
+    contributions(run, batch, &row, (const msfp_columns *)s->row, 0, value, s->contributed);
     for (int i = 0; i < EXTREMES; ++i)
         force[i] = NAN;
     memcpy(force + EXTREME(top_force), value + EXTREME(top_force), sizeof run->extremes.top_force);
-    return take(run, group, force, s->contributed, changed);
+    return take(run, batch, force, s->contributed, changed);
 }
 
-void msfp_extremes_of_step(msfp_run *run, msfp_group *group)
+void msfp_extremes_of_step(msfp_run *run, msfp_parameter_batch *batch)
 {
     msfp_recording *s = &run->gradients->recording;
     const double *now = (const double *)&run->extremes, *before = (const double *)&run->gradients->extremes;
@@ -116,29 +117,30 @@ void msfp_extremes_of_step(msfp_run *run, msfp_group *group)
     if (!any)
         return;
     msfp_record(&run->parameters, &run->reached, &run->work, &run->next.mechanical, &row);
-    msfp_row_reached_columns(run, group);
-    contributions(run, group, &row, (const msfp_columns *)group->end_row, 0, value, s->contributed);
-    int left = take(run, group, value, s->contributed, changed);
+    msfp_row_reached_columns(run, batch);
+    contributions(run, batch, &row, (const msfp_columns *)batch->end_row, 0, value, s->contributed);
+    int left = take(run, batch, value, s->contributed, changed);
     for (int i = 0; i < run->node_count && left; ++i)
-        left = take_node(run, group, i, changed);
+        left = take_node(run, batch, i, changed);
     const double share = turning_share(run);
     if (!left || share >= 1.0)
         return;
     if (run->node_count) {
         msfp_row_inside(run, share, &row);
-        msfp_row_between_columns(run, group, share, 0, s->row);
+        msfp_row_between_columns(run, batch, share, 0, s->row);
     } else
-        msfp_row_of_cubic_columns(run, group, share, &row, s->row);
-    contributions(run, group, &row, (const msfp_columns *)s->row, 1, value, s->contributed);
-    take(run, group, value, s->contributed, changed);
+        msfp_row_of_cubic_columns(run, batch, share, &row, s->row);
+    contributions(run, batch, &row, (const msfp_columns *)s->row, 1, value, s->contributed);
+    take(run, batch, value, s->contributed, changed);
 }
 
-void msfp_extremes_of_first_row(const msfp_run *run, msfp_group *group, const msfp_row *row, const msfp_row_columns d)
+void msfp_extremes_of_first_row(const msfp_run *run, msfp_parameter_batch *batch, const msfp_row *row,
+                                const msfp_row_columns d)
 {
     double value[EXTREMES];
     for (int axis = 0; axis < 3; ++axis)
         for (int c = 0; c < C; ++c)
-            group->start[axis][c] = d[MSFP_ROW_BASE + axis][c] - d[MSFP_ROW_TOP + axis][c];
-    contributions(run, group, row, d, 0, value, group->extremes);
+            batch->start[axis][c] = d[MSFP_ROW_BASE + axis][c] - d[MSFP_ROW_TOP + axis][c];
+    contributions(run, batch, row, d, 0, value, batch->extremes);
 }
 #endif

@@ -76,19 +76,19 @@ static msfp_history history(const msfp_history *of, const double *coefficients, 
     return found;
 }
 
-static void fill_group(const msfp_run *run, const msfp_gradient_inputs *in, int first, msfp_group *group)
+static void fill_batch(const msfp_run *run, const msfp_gradient_inputs *in, int first, msfp_parameter_batch *batch)
 {
     value_columns values = { .gravity = { 0.0 } };
     for (int c = 0; c < C && first + c < in->count; ++c) {
         const int i = first + c;
         read_values(in, i, c, &values);
-        group->motion[c] = history(&run->motion, in->motions, (int)in->motion[i]);
-        group->load[c] = history(&run->load, in->loads, (int)in->load[i]);
-        put_column(group->now.q[0][0], in->q + (size_t)i * NB * NQ, NB * NQ, c);
-        put_column(group->now.v[0][0], in->v + (size_t)i * NB * NQ, NB * NQ, c);
-        put_column(group->now.f[0][0], in->f + (size_t)i * NB * 2, NB * 2, c);
+        batch->motion[c] = history(&run->motion, in->motions, (int)in->motion[i]);
+        batch->load[c] = history(&run->load, in->loads, (int)in->load[i]);
+        put_column(batch->now.q[0][0], in->q + (size_t)i * NB * NQ, NB * NQ, c);
+        put_column(batch->now.v[0][0], in->v + (size_t)i * NB * NQ, NB * NQ, c);
+        put_column(batch->now.f[0][0], in->f + (size_t)i * NB * 2, NB * 2, c);
     }
-    parameters(&run->parameters, &values, &group->parameters);
+    parameters(&run->parameters, &values, &batch->parameters);
 }
 
 int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *in)
@@ -98,18 +98,18 @@ int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *in)
         return run->status = MSFP_E_MEMORY;
     run->gradients = g;
     g->count = in->count;
-    g->groups = (in->count + C - 1) / C;
+    g->batches = (in->count + C - 1) / C;
     g->energies = in->energies;
     g->event_time = -INFINITY;
     g->steps = in->steps;
     g->step_count = in->step_count;
-    g->group = calloc(g->groups ? (size_t)g->groups : 1, sizeof *g->group);
-    if (!g->group)
+    g->batch = calloc(g->batches ? (size_t)g->batches : 1, sizeof *g->batch);
+    if (!g->batch)
         return run->status = MSFP_E_MEMORY;
-    for (int i = 0; i < g->groups; ++i)
-        fill_group(run, in, i * C, &g->group[i]);
-    for (int i = 0; i < g->groups && run->status == MSFP_OK; ++i)
-        run->status = msfp_initial_columns(run, &g->group[i], 1);
+    for (int i = 0; i < g->batches; ++i)
+        fill_batch(run, in, i * C, &g->batch[i]);
+    for (int i = 0; i < g->batches && run->status == MSFP_OK; ++i)
+        run->status = msfp_initial_columns(run, &g->batch[i], 1);
     if (run->status == MSFP_OK && g->count)
         run->status = msfp_record_present_columns(run, 1);
     return run->status;
@@ -119,7 +119,7 @@ void msfp_gradients_free(msfp_run *run)
 {
     if (!run->gradients)
         return;
-    free(run->gradients->group);
+    free(run->gradients->batch);
     free(run->gradients->rows);
     free(run->gradients->events);
     free(run->gradients);
@@ -142,9 +142,9 @@ void msfp_gradient_extremes(const msfp_run *run, int parameter, double *out)
 {
     if (!run->gradients || parameter < 0 || parameter >= run->gradients->count)
         return;
-    const msfp_group *group = &run->gradients->group[parameter / C];
+    const msfp_parameter_batch *batch = &run->gradients->batch[parameter / C];
     for (size_t i = 0; i < sizeof(msfp_extremes) / sizeof(double); ++i)
-        out[i] = group->extremes[i][parameter % C];
+        out[i] = batch->extremes[i][parameter % C];
 }
 
 /* ---- hooks ---- */
@@ -159,16 +159,16 @@ void msfp_gradients_stage(msfp_run *run, int i, const msfp_stage *stage)
 {
     if (!run->gradients)
         return;
-    run->gradients->trail.stage[i] = *stage;
-    memcpy(&run->gradients->trail.work[i], &run->work, offsetof(msfp_work, dx)); /* without derivatives */
+    run->gradients->stage_history.stage[i] = *stage;
+    memcpy(&run->gradients->stage_history.work[i], &run->work, offsetof(msfp_work, dx)); /* without derivatives */
 }
 
 void msfp_gradients_states(msfp_run *run, const msfp_stages *s, int ringing)
 {
     if (!run->gradients)
         return;
-    memcpy(run->gradients->trail.state, s->stage, sizeof s->stage);
-    run->gradients->trail.ringing = ringing;
+    memcpy(run->gradients->stage_history.state, s->stage, sizeof s->stage);
+    run->gradients->stage_history.ringing = ringing;
 }
 
 msfp_observation *msfp_gradients_node(msfp_run *run, int index)
@@ -197,21 +197,21 @@ void msfp_gradients_before_step(msfp_run *run)
 
 void msfp_gradients_accept(msfp_run *run)
 {
-    for (int i = 0; run->gradients && i < run->gradients->groups; ++i) {
-        msfp_group *group = &run->gradients->group[i];
-        group->now = group->next;
-        group->start_known = group->end_known;
-        if (group->end_known)
-            memcpy(group->start_row, group->end_row, sizeof group->end_row);
+    for (int i = 0; run->gradients && i < run->gradients->batches; ++i) {
+        msfp_parameter_batch *batch = &run->gradients->batch[i];
+        batch->now = batch->next;
+        batch->start_known = batch->end_known;
+        if (batch->end_known)
+            memcpy(batch->start_row, batch->end_row, sizeof batch->end_row);
     }
 }
 
 int msfp_gradients_jump(msfp_run *run)
 {
     int status = MSFP_OK;
-    for (int i = 0; run->gradients && i < run->gradients->groups && status == MSFP_OK; ++i) {
-        run->gradients->group[i].start_known = 0;
-        status = msfp_initial_columns(run, &run->gradients->group[i], 0);
+    for (int i = 0; run->gradients && i < run->gradients->batches && status == MSFP_OK; ++i) {
+        run->gradients->batch[i].start_known = 0;
+        status = msfp_initial_columns(run, &run->gradients->batch[i], 0);
     }
     return status;
 }

@@ -41,7 +41,8 @@ typedef struct {
 typedef struct {
     double x[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_COLUMNS], body[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_COLUMNS];
     double force[MSFP_NB + 1][MSFP_FORCE_SIZE * MSFP_COLUMNS], moment[MSFP_NB + 1][MSFP_MOMENT_SIZE * MSFP_COLUMNS];
-    double local[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_COLUMNS], stage[MSFP_NB][MSFP_STAGE_SIZE * MSFP_COLUMNS], contact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_COLUMNS];
+    double contact_frame[MSFP_NB][MSFP_CONTACT_FRAME_SIZE * MSFP_COLUMNS],
+        stage[MSFP_NB][MSFP_STAGE_SIZE * MSFP_COLUMNS], contact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_COLUMNS];
     double rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_COLUMNS], foot[MSFP_FOOT_SIZE * MSFP_COLUMNS];
     double lock[MSFP_NB][MSFP_LOCK_SIZE * MSFP_COLUMNS];
 #if MSFP_UPLIFT
@@ -149,7 +150,7 @@ typedef struct {
 #if MSFP_CLOSED_FORM
     msfp_history_columns history;
 #endif
-} msfp_group;
+} msfp_parameter_batch;
 
 /* The stages of a step as the method solved them, and their factored tangents. */
 typedef struct {
@@ -161,10 +162,10 @@ typedef struct {
     int ringing; /* whether the step integrates its works as where rates ring (refine_integrals of implicit.c) */
     double factors[MSFP_STAGES][MSFP_DOF * MSFP_DOF];
     int pivots[MSFP_STAGES][MSFP_DOF];
-} msfp_trail;
+} msfp_stage_history;
 
-/* Rows at the start of the last step, at its interpolation nodes and at its end, with the evaluations there; and columns
- * of one group. */
+/* Rows at the start of the last step, at its interpolation nodes and at its end, with the evaluations there; and
+ * columns of one batch. */
 typedef struct {
     msfp_row value[MSFP_NODES + 2];
     msfp_observation node[MSFP_NODES + 2];
@@ -179,10 +180,10 @@ typedef struct {
 } msfp_recording;
 
 struct msfp_gradients {
-    int count, groups; /* parameters, and groups of MSFP_COLUMNS of them */
+    int count, batches; /* parameters, and batches of MSFP_COLUMNS of them */
     int energies;      /* whether columns of the works are computed */
-    msfp_group *group;
-    msfp_trail trail;
+    msfp_parameter_batch *batch;
+    msfp_stage_history stage_history;
     msfp_recording recording;
     const double *steps; /* ends of the steps where they are prescribed [s], with their number and how many are taken */
     int step_count, step;
@@ -200,7 +201,7 @@ struct msfp_gradients {
 
 /* Columns of the time from the end of the step to an event there, by those of the state at the end: minus the columns of
  * what decides the event, over its rate. Where that does not change they are zero. */
-void msfp_event_time_columns(msfp_run *run, msfp_group *group, int kind, int j, double *dt);
+void msfp_event_time_columns(msfp_run *run, msfp_parameter_batch *batch, int kind, int j, double *dt);
 
 /* ---- initial_columns.c, step_columns.c: states ---- */
 
@@ -276,18 +277,19 @@ MSFP_INLINE int msfp_last_stage(const msfp_run *run)
     return msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
 }
 /* Columns of base motion and load at time t [s], whose columns are dt, into `dat`. */
-void msfp_inputs_columns(msfp_run *run, msfp_group *group, double t, const double *dt, msfp_point_columns *dat);
+void msfp_inputs_columns(msfp_run *run, msfp_parameter_batch *batch, double t, const double *dt,
+                         msfp_point_columns *dat);
 /* Solve factors x = columns [MSFP_DOF][MSFP_COLUMNS], in place. */
 void msfp_solve_columns(const double *factors, const int *pivots, msfp_columns *columns);
 /* Columns of the rates of Y, Z, and where f is given of Y, Z. */
 void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[MSFP_NB][2], msfp_columns f[MSFP_NB][2]);
 /* Columns of accelerations and rates that are consistent with the present state, after those of q, v, f and the foot;
  * first: at the start of the run, where the columns of the foot follow too. Returns a status. */
-int msfp_initial_columns(msfp_run *run, msfp_group *group, int first);
-/* Columns of the accepted step, whose stages are in the trail; group->h is given. */
-void msfp_step_columns(msfp_run *run, msfp_group *group);
+int msfp_initial_columns(msfp_run *run, msfp_parameter_batch *batch, int first);
+/* Columns of the accepted step, whose stages are in the stage history; batch->h is given. */
+void msfp_step_columns(msfp_run *run, msfp_parameter_batch *batch);
 /* Complete the columns of the evaluation that ended the step. */
-void msfp_complete_columns(msfp_run *run, msfp_group *group);
+void msfp_complete_columns(msfp_run *run, msfp_parameter_batch *batch);
 
 /* ---- memory_columns.c: memories of the surfaces, as the functions of memory.c without "columns" ---- */
 #if MSFP_MEMORY
@@ -308,34 +310,36 @@ void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_colum
                             const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
                             msfp_state_columns *to);
 /* Columns of the powers of the present state, at the point and evaluation of msfp_initial_columns. */
-void msfp_initial_works(msfp_run *run, msfp_group *group, const msfp_point *at, const msfp_seed *seed,
+void msfp_initial_works(msfp_run *run, msfp_parameter_batch *batch, const msfp_point *at, const msfp_seed *seed,
                         const double g[MSFP_NB][2]);
 /* Columns of powers and works of stage i, which is solved, into stages[i]; from: what the earlier ones give. */
-void msfp_stage_works(msfp_run *run, msfp_group *group, int i, const msfp_state_columns *from,
+void msfp_stage_works(msfp_run *run, msfp_parameter_batch *batch, int i, const msfp_state_columns *from,
                       msfp_state_columns *stages);
 /* Columns of the works of a quasi-static step, whose evaluation is complete. */
-void msfp_quasistatic_works(msfp_run *run, msfp_group *group);
+void msfp_quasistatic_works(msfp_run *run, msfp_parameter_batch *batch);
 
 /* ---- row_columns.c ---- */
 
 /* Columns of the row of a state; ds: columns of the state. */
-void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s, const msfp_state_columns *ds,
+void msfp_observe_columns(msfp_run *run, msfp_parameter_batch *batch, const msfp_state *s, const msfp_state_columns *ds,
                           msfp_row_columns d);
 /* Columns of the rows at the ends and nodes of the step, into the recording, unless they are there. */
-void msfp_observe_node_columns(msfp_run *run, msfp_group *group);
+void msfp_observe_node_columns(msfp_run *run, msfp_parameter_batch *batch);
 /* Columns of the row at a share of the last step; moving: whether the share is a fixed time, and so depends on the
  * parameters where the ends of the step do. */
-void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving, msfp_row_columns d);
-/* Columns of the row of the end of the step, group->end_row, unless they are known. */
-void msfp_row_reached_columns(msfp_run *run, msfp_group *group);
+void msfp_row_between_columns(msfp_run *run, msfp_parameter_batch *batch, double share, int moving, msfp_row_columns d);
+/* Columns of the row of the end of the step, batch->end_row, unless they are known. */
+void msfp_row_reached_columns(msfp_run *run, msfp_parameter_batch *batch);
 /* Row and columns at a share of a quasi-static step. */
-void msfp_row_of_cubic_columns(msfp_run *run, msfp_group *group, double share, msfp_row *row, msfp_row_columns d);
+void msfp_row_of_cubic_columns(msfp_run *run, msfp_parameter_batch *batch, double share, msfp_row *row,
+                               msfp_row_columns d);
 
 /* ---- extreme_columns.c ---- */
 
 /* Columns of the extremes that the first row, or the step, has changed. */
-void msfp_extremes_of_first_row(const msfp_run *run, msfp_group *group, const msfp_row *row, const msfp_row_columns d);
-void msfp_extremes_of_step(msfp_run *run, msfp_group *group);
+void msfp_extremes_of_first_row(const msfp_run *run, msfp_parameter_batch *batch, const msfp_row *row,
+                                const msfp_row_columns d);
+void msfp_extremes_of_step(msfp_run *run, msfp_parameter_batch *batch);
 
 /* ---- recording.c ---- */
 

@@ -23,7 +23,7 @@ MSFP_INLINE void third_derivative(const msfp_history *h, double t, double out[6]
     }
 }
 
-MSFP_COLUMNWISE void msfp_inputs_columns(msfp_run *run, msfp_group *group, double t, const double *dt,
+MSFP_COLUMNWISE void msfp_inputs_columns(msfp_run *run, msfp_parameter_batch *batch, double t, const double *dt,
                                          msfp_point_columns *dat)
 {
     double found[3][6], third[6];
@@ -36,15 +36,15 @@ MSFP_COLUMNWISE void msfp_inputs_columns(msfp_run *run, msfp_group *group, doubl
 #endif
     dat->base_moves = msfp_any_column(dt);
     for (int c = 0; c < C; ++c) {
-        if (group->motion[c].pieces) {
+        if (batch->motion[c].pieces) {
             dat->base_moves = 1;
-            msfp_history_at(&group->motion[c], t, 3, found);
+            msfp_history_at(&batch->motion[c], t, 3, found);
             for (int order = 0; order < 3; ++order)
                 for (int i = 0; i < 6; ++i)
                     dat->base[order][i][c] = found[order][i];
         }
-        if (group->load[c].pieces) {
-            msfp_history_at(&group->load[c], t, 1, found);
+        if (batch->load[c].pieces) {
+            msfp_history_at(&batch->load[c], t, 1, found);
             for (int i = 0; i < 6; ++i)
                 dat->load[i][c] = found[0][i];
         }
@@ -65,16 +65,16 @@ MSFP_COLUMNWISE void msfp_inputs_columns(msfp_run *run, msfp_group *group, doubl
 #endif
 }
 
-int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
+int msfp_initial_columns(msfp_run *run, msfp_parameter_batch *batch, int first)
 {
     const msfp_parameters *p = &run->parameters;
-    const msfp_parameter_columns *dp = &group->parameters;
-    msfp_trail *trail = &run->gradients->trail;
-    msfp_work *w = &trail->work[0];
-    msfp_slopes *slopes = &trail->slopes[0];
-    msfp_state_columns *now = &group->now;
-    msfp_point_columns *dat = &group->point;
-    msfp_seed seed = { .ca = 1.0 };
+    const msfp_parameter_columns *dp = &batch->parameters;
+    msfp_stage_history *stage_history = &run->gradients->stage_history;
+    msfp_work *w = &stage_history->work[0];
+    msfp_slopes *slopes = &stage_history->slopes[0];
+    msfp_state_columns *now = &batch->now;
+    msfp_point_columns *dat = &batch->point;
+    msfp_seed seed = { .a_weight = 1.0 };
     msfp_point at;
     double g[NB][2], residual[DOF];
     msfp_to_point(run, &run->now, &at);
@@ -83,7 +83,7 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
 #if MSFP_LAW
     memset(w->coefficient, 0, sizeof w->coefficient);
 #endif
-    const int status = msfp_condensed(p, &at, &seed, w, g, residual, trail->factors[0]);
+    const int status = msfp_condensed(p, &at, &seed, w, g, residual, stage_history->factors[0]);
     if (status)
         return status;
     msfp_contact_slopes(p, &seed, w, (const double(*)[2])g, 0, slopes);
@@ -94,35 +94,35 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
     memcpy(dat->v, now->v, sizeof dat->v);
     memcpy(dat->f, now->f, sizeof dat->f);
     msfp_memory_point_columns(&run->now, now, 0.0, dat);
-    msfp_inputs_columns(run, group, run->now.t, now->t, dat);
+    msfp_inputs_columns(run, batch, run->now.t, now->t, dat);
     if (first) {
-        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
-        msfp_resting_foot_direction(p->top, w->body[NB], dp->top, group->work.body[NB], now->foot[0]);
+        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &batch->work);
+        msfp_resting_foot_direction(p->top, w->body[NB], dp->top, batch->work.body[NB], now->foot[0]);
     }
     memcpy(dat->foot, now->foot, sizeof dat->foot);
-    msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
+    msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &batch->work);
     if (!MSFP_MASSLESS) {
-        if (msfp_lu(trail->factors[0], DOF, trail->pivots[0]) == 0)
+        if (msfp_lu(stage_history->factors[0], DOF, stage_history->pivots[0]) == 0)
             return MSFP_E_IRREGULAR;
-        msfp_solve_columns(trail->factors[0], trail->pivots[0], group->work.residual);
+        msfp_solve_columns(stage_history->factors[0], stage_history->pivots[0], batch->work.residual);
         for (int k = 0; k < NB; ++k)
             for (int i = 0; i < ND; ++i)
-                msfp_add_columns(&now->a[k][unknown[i]], &group->work.residual[k * ND + i], -1.0, 1);
+                msfp_add_columns(&now->a[k][unknown[i]], &batch->work.residual[k * ND + i], -1.0, 1);
         memcpy(dat->a, now->a, sizeof dat->a);
-        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
+        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &batch->work);
     }
-    msfp_friction_columns(&group->work, now->df, NULL);
+    msfp_friction_columns(&batch->work, now->df, NULL);
 #if MSFP_MEMORY
     static const msfp_columns fixed;
     msfp_columns source[NB];
     for (int j = 0; j < NB; ++j)
-        memcpy(source[j], group->work.contact[j] + MSFP_CONTACT_SOURCE * C, sizeof source[j]);
+        memcpy(source[j], batch->work.contact[j] + MSFP_CONTACT_SOURCE * C, sizeof source[j]);
     msfp_memory_state_columns(&run->now, now, (const msfp_columns *)source, 0.0, fixed, now);
 #endif
-    memcpy(now->foot, group->work.foot + MSFP_FOOT_Y * C, sizeof now->foot);
-    memcpy(now->dfoot, group->work.foot + MSFP_FOOT_Y1 * C, sizeof now->dfoot);
+    memcpy(now->foot, batch->work.foot + MSFP_FOOT_Y * C, sizeof now->foot);
+    memcpy(now->dfoot, batch->work.foot + MSFP_FOOT_Y1 * C, sizeof now->dfoot);
     if (run->gradients->energies)
-        msfp_initial_works(run, group, &at, &seed, (const double(*)[2])g);
+        msfp_initial_works(run, batch, &at, &seed, (const double(*)[2])g);
     return MSFP_OK;
 }
 #endif

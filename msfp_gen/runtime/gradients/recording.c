@@ -24,12 +24,12 @@ static int reserve(const struct msfp_gradients *g, double **items, size_t wanted
     return MSFP_OK;
 }
 
-/* Put the columns of a group into item `index` of `items`, [item][parameter][size]. */
-static void store(const struct msfp_gradients *g, double *items, size_t index, int group, int size,
+/* Put the columns of a batch into item `index` of `items`, [item][parameter][size]. */
+static void store(const struct msfp_gradients *g, double *items, size_t index, int batch, int size,
                   const msfp_columns *d)
 {
-    const int used = g->count - group * C; /* of the columns, where fewer than all */
-    double *const to = items + (index * (size_t)g->count + (size_t)(group * C)) * (size_t)size;
+    const int used = g->count - batch * C; /* of the columns, where fewer than all */
+    double *const to = items + (index * (size_t)g->count + (size_t)(batch * C)) * (size_t)size;
     for (int i = 0; i < size && used >= C; ++i) {
         MSFP_UNROLL
         for (int c = 0; c < C; ++c)
@@ -42,13 +42,14 @@ static void store(const struct msfp_gradients *g, double *items, size_t index, i
 
 /* Columns of an event at the end of the step. Where a surface lifts off or lands, and in a quasi-static run, the end of
  * a step does not move with the parameters: the state at the event moves along the solution. */
-static void event_columns(msfp_run *run, msfp_group *group, int kind, int j, msfp_row_columns d, msfp_columns *event)
+static void event_columns(msfp_run *run, msfp_parameter_batch *batch, int kind, int j, msfp_row_columns d,
+                          msfp_columns *event)
 {
     const msfp_state *next = &run->next;
-    msfp_state_columns at = group->next;
+    msfp_state_columns at = batch->next;
     msfp_columns dt;
     if (msfp_is_quasistatic(run) || kind == MSFP_EVENT_LIFT_OFF || kind == MSFP_EVENT_LANDING) {
-        msfp_event_time_columns(run, group, kind, j, dt);
+        msfp_event_time_columns(run, batch, kind, j, dt);
         msfp_add_columns(&at.t, (const msfp_columns *)&dt, 1.0, 1);
         msfp_add_scaled(at.q[0], next->v[0], dt, 1.0, NB * NQ);
         msfp_add_scaled(at.v[0], next->a[0], dt, 1.0, NB * NQ);
@@ -57,11 +58,11 @@ static void event_columns(msfp_run *run, msfp_group *group, int kind, int j, msf
         if (!MSFP_MASSLESS)
             msfp_add_scaled(at.a[0], run->acceleration_slope[0], dt, 1.0, NB * NQ);
     }
-    msfp_observe_columns(run, group, next, &at, d);
+    msfp_observe_columns(run, batch, next, &at, d);
     memcpy(event[0], at.t, sizeof *event);
     for (int axis = 0; axis < 3; ++axis)
         for (int c = 0; c < C; ++c)
-            event[1 + axis][c] = d[MSFP_ROW_BASE + axis][c] - d[MSFP_ROW_TOP + axis][c] - group->start[axis][c];
+            event[1 + axis][c] = d[MSFP_ROW_BASE + axis][c] - d[MSFP_ROW_TOP + axis][c] - batch->start[axis][c];
     memcpy(event + 4, d + MSFP_ROW_TOP_FORCE, 3 * sizeof *event);
 }
 
@@ -71,15 +72,15 @@ int msfp_record_present_columns(msfp_run *run, int first)
     msfp_columns *d = g->recording.row;
     if (reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE)) /* NOLINT(-Wanalyzer-malloc-leak): kept in g */
         return MSFP_E_MEMORY;
-    for (int i = 0; i < g->groups; ++i) {
-        msfp_group *group = &g->group[i];
-        msfp_observe_columns(run, group, &run->now, &group->now, d);
+    for (int i = 0; i < g->batches; ++i) {
+        msfp_parameter_batch *batch = &g->batch[i];
+        msfp_observe_columns(run, batch, &run->now, &batch->now, d);
         for (size_t r = g->row_count; r < run->row_count; ++r)
             store(g, g->rows, r, i, MSFP_ROW_SIZE, (const msfp_columns *)d);
         if (first) {
             msfp_row row;
             msfp_observe_state(run, &run->now, &row);
-            msfp_extremes_of_first_row(run, group, &row, (const msfp_columns *)d);
+            msfp_extremes_of_first_row(run, batch, &row, (const msfp_columns *)d);
         }
     }
     g->row_count = run->row_count;
@@ -87,15 +88,15 @@ int msfp_record_present_columns(msfp_run *run, int first)
 }
 
 /* Columns of a row that the step recorded, at a fixed time: the end of the step, where it is fixed, or inside it. */
-static const msfp_columns *row_columns(msfp_run *run, msfp_group *group, double time)
+static const msfp_columns *row_columns(msfp_run *run, msfp_parameter_batch *batch, double time)
 {
     msfp_columns *d = run->gradients->recording.row;
-    if (msfp_is_quasistatic(run) || (run->options.output_step <= 0.0 && !msfp_any_column(group->next.t))) {
-        msfp_row_reached_columns(run, group);
-        return (const msfp_columns *)group->end_row;
+    if (msfp_is_quasistatic(run) || (run->options.output_step <= 0.0 && !msfp_any_column(batch->next.t))) {
+        msfp_row_reached_columns(run, batch);
+        return (const msfp_columns *)batch->end_row;
     }
     const double share = (time - run->now.t) / (run->next.t - run->now.t);
-    msfp_row_between_columns(run, group, fmin(1.0, share), 1, d);
+    msfp_row_between_columns(run, batch, fmin(1.0, share), 1, d);
     return (const msfp_columns *)d;
 }
 
@@ -104,10 +105,10 @@ int msfp_record_rows_columns(msfp_run *run)
     struct msfp_gradients *g = run->gradients;
     if (reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE)) /* NOLINT(-Wanalyzer-malloc-leak): kept in g */
         return MSFP_E_MEMORY;
-    for (int i = 0; i < g->groups; ++i) {
+    for (int i = 0; i < g->batches; ++i) {
         g->recording.columns_known = 0;
         for (size_t r = g->row_count; r < run->row_count; ++r)
-            store(g, g->rows, r, i, MSFP_ROW_SIZE, row_columns(run, &g->group[i], run->rows[r].time));
+            store(g, g->rows, r, i, MSFP_ROW_SIZE, row_columns(run, &g->batch[i], run->rows[r].time));
     }
     g->row_count = run->row_count;
     return MSFP_OK;
@@ -118,15 +119,15 @@ int msfp_record_extremes_columns(msfp_run *run)
     struct msfp_gradients *g = run->gradients;
     if (reserve(g, &g->events, run->event_count, &g->event_capacity, EVENT)) /* NOLINT(-Wanalyzer-malloc-leak): kept in g */
         return MSFP_E_MEMORY;
-    for (int i = 0; i < g->groups; ++i) {
-        msfp_group *group = &g->group[i];
+    for (int i = 0; i < g->batches; ++i) {
+        msfp_parameter_batch *batch = &g->batch[i];
         msfp_columns event[EVENT];
         for (size_t e = g->event_count; e < run->event_count; ++e) {
-            event_columns(run, group, run->events[e].kind, run->events[e].surface - 1, g->recording.row, event);
+            event_columns(run, batch, run->events[e].kind, run->events[e].surface - 1, g->recording.row, event);
             store(g, g->events, e, i, EVENT, (const msfp_columns *)event);
         }
         g->recording.columns_known = 0;
-        msfp_extremes_of_step(run, group);
+        msfp_extremes_of_step(run, batch);
     }
     g->event_count = run->event_count;
     return MSFP_OK;

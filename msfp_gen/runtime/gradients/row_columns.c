@@ -8,26 +8,27 @@
 
 #if MSFP_GRADIENTS
 /* Columns of the row of an observed state. */
-static void observed_columns(msfp_run *run, msfp_group *group, const msfp_observation *o, const msfp_slopes *slopes,
-                             const msfp_state *s, const msfp_state_columns *ds, msfp_row_columns d)
+static void observed_columns(msfp_run *run, msfp_parameter_batch *batch, const msfp_observation *o,
+                             const msfp_slopes *slopes, const msfp_state *s, const msfp_state_columns *ds,
+                             msfp_row_columns d)
 {
     const msfp_parameters *p = &run->parameters;
     msfp_work_columns *dw = &run->gradients->recording.work;
     msfp_point_columns dat;
     memset(&dat, 0, sizeof dat);
-    msfp_inputs_columns(run, group, s->t, ds->t, &dat);
+    msfp_inputs_columns(run, batch, s->t, ds->t, &dat);
     memcpy(dat.q, ds->q, sizeof dat.q);
     memcpy(dat.v, ds->v, sizeof dat.v);
     memcpy(dat.a, ds->a, sizeof dat.a);
     memcpy(dat.f, ds->f, sizeof dat.f);
     memcpy(dat.foot, ds->foot, sizeof dat.foot);
     msfp_memory_point_columns(s, ds, 0.0, &dat);
-    msfp_condensed_columns(p, &group->parameters, &o->at, &dat, &o->seed, &o->work, slopes, MSFP_OF_ROW, dw);
-    msfp_record_columns(p, &group->parameters, &o->at, &dat, &o->work, dw, d);
+    msfp_condensed_columns(p, &batch->parameters, &o->at, &dat, &o->seed, &o->work, slopes, MSFP_OF_ROW, dw);
+    msfp_record_columns(p, &batch->parameters, &o->at, &dat, &o->work, dw, d);
     memcpy(d[MSFP_ROW_WORK], ds->work, sizeof ds->work);
 }
 
-void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s, const msfp_state_columns *ds,
+void msfp_observe_columns(msfp_run *run, msfp_parameter_batch *batch, const msfp_state *s, const msfp_state_columns *ds,
                           msfp_row_columns d)
 {
     const msfp_parameters *p = &run->parameters;
@@ -36,11 +37,11 @@ void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s,
     msfp_to_point(run, s, &o->at);
     msfp_evaluate_state(p, &o->at, &o->seed, &o->work, o->g);
     msfp_contact_slopes(p, &o->seed, &o->work, (const double(*)[2])o->g, 1, slopes);
-    observed_columns(run, group, o, slopes, s, ds, d);
+    observed_columns(run, batch, o, slopes, s, ds, d);
 }
 
 /* Columns of row `index` of those at the start of the step and at its nodes, at the state with the columns ds. */
-static void node_columns(msfp_run *run, msfp_group *group, int index, const msfp_state *s,
+static void node_columns(msfp_run *run, msfp_parameter_batch *batch, int index, const msfp_state *s,
                          const msfp_state_columns *ds, msfp_row_columns d)
 {
     msfp_recording *r = &run->gradients->recording;
@@ -48,19 +49,19 @@ static void node_columns(msfp_run *run, msfp_group *group, int index, const msfp
     if (!r->sloped[index])
         msfp_contact_slopes(&run->parameters, &o->seed, &o->work, (const double(*)[2])o->g, 1, &r->slopes[index]);
     r->sloped[index] = 1;
-    observed_columns(run, group, o, &r->slopes[index], s, ds, d);
+    observed_columns(run, batch, o, &r->slopes[index], s, ds, d);
 }
 
 /* Columns of the accelerations at a share of the step. */
-static void accelerations_inside(const msfp_group *group, double share, msfp_state_columns *to)
+static void accelerations_inside(const msfp_parameter_batch *batch, double share, msfp_state_columns *to)
 {
-    const double *a = group->now.a[0][0], *b = group->next.a[0][0];
+    const double *a = batch->now.a[0][0], *b = batch->next.a[0][0];
     double *out = to->a[0][0];
     for (int i = 0; i < NB * NQ * C; ++i)
         out[i] = (1.0 - share) * a[i] + share * b[i];
 }
 
-void msfp_observe_node_columns(msfp_run *run, msfp_group *group)
+void msfp_observe_node_columns(msfp_run *run, msfp_parameter_batch *batch)
 {
     msfp_recording *r = &run->gradients->recording;
     const int last = run->node_count + 1;
@@ -69,20 +70,20 @@ void msfp_observe_node_columns(msfp_run *run, msfp_group *group)
         return;
     if (!r->known)
         msfp_row_inside(run, 1.0, &row); /* which gives the rows to msfp_gradients_node */
-    if (!group->start_known)
-        node_columns(run, group, 0, &run->now, &group->now, group->start_row);
-    memcpy(r->d[0], group->start_row, sizeof group->start_row);
+    if (!batch->start_known)
+        node_columns(run, batch, 0, &run->now, &batch->now, batch->start_row);
+    memcpy(r->d[0], batch->start_row, sizeof batch->start_row);
     for (int i = 1; i < last; ++i) {
         const double share = run->node[i - 1].share;
-        msfp_state_columns *node = &group->node[i - 1];
+        msfp_state_columns *node = &batch->node[i - 1];
         for (int c = 0; c < C; ++c)
-            node->t[c] = group->now.t[c] + share * group->h[c];
-        accelerations_inside(group, share, node);
-        node_columns(run, group, i, &run->node[i - 1].state, node, r->d[i]);
+            node->t[c] = batch->now.t[c] + share * batch->h[c];
+        accelerations_inside(batch, share, node);
+        node_columns(run, batch, i, &run->node[i - 1].state, node, r->d[i]);
     }
-    msfp_row_reached_columns(run, group);
-    memcpy(r->d[last], group->end_row, sizeof group->end_row);
-    r->columns_known = group->start_known = 1;
+    msfp_row_reached_columns(run, batch);
+    memcpy(r->d[last], batch->end_row, sizeof batch->end_row);
+    r->columns_known = batch->start_known = 1;
 }
 
 /* Derivatives of the weights of msfp_weights_at with respect to the share. */
@@ -135,11 +136,11 @@ static void limit_friction(const msfp_recording *rows, int count, const msfp_row
 static void clear(msfp_columns *columns, int count) { memset(columns, 0, count * sizeof *columns); }
 
 /* As restore_bounds of output.c. row: the row before its bounds are restored. */
-static void restore_bounds(msfp_run *run, msfp_group *group, const msfp_row *row, msfp_row_columns d)
+static void restore_bounds(msfp_run *run, msfp_parameter_batch *batch, const msfp_row *row, msfp_row_columns d)
 {
     msfp_columns gaps[NB][MSFP_GAP_SIZE];
     double sliding[NB][MSFP_GAP_SIZE];
-    msfp_gaps_columns(&run->parameters, &group->parameters, row->q, (msfp_columns(*)[NQ])(d + MSFP_ROW_Q), sliding,
+    msfp_gaps_columns(&run->parameters, &batch->parameters, row->q, (msfp_columns(*)[NQ])(d + MSFP_ROW_Q), sliding,
                       gaps);
     if (row->kinetic < 0.0)
         clear(&d[MSFP_ROW_KINETIC], 1);
@@ -160,10 +161,10 @@ static void restore_bounds(msfp_run *run, msfp_group *group, const msfp_row *row
     }
 }
 
-MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving,
+MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batch *batch, double share, int moving,
                                               msfp_row_columns d)
 {
-    msfp_observe_node_columns(run, group);
+    msfp_observe_node_columns(run, batch);
     const msfp_recording *rows = &run->gradients->recording;
     const msfp_weights w = msfp_weights_at(run, share);
     const double h = run->next.t - run->now.t;
@@ -177,7 +178,7 @@ MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_group *group, 
     msfp_weigh(w.of, w.count, values, MSFP_ROW_SIZE, (double *)&blended);
     msfp_weigh(w.of, w.count, columns, MSFP_ROW_SIZE * C, d[0]);
     for (int c = 0; c < C; ++c)
-        moved[c] = -(group->now.t[c] + share * group->h[c]) / h;
+        moved[c] = -(batch->now.t[c] + share * batch->h[c]) / h;
     if (moving && msfp_any_column(moved)) {
         double slopes[MSFP_NODES + 2], slope[MSFP_ROW_SIZE];
         weight_slopes(run, share, slopes);
@@ -185,26 +186,27 @@ MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_group *group, 
         msfp_add_scaled(d, slope, moved, 1.0, MSFP_ROW_SIZE);
     }
     limit_friction(rows, w.count, &blended, d);
-    restore_bounds(run, group, &blended, d);
+    restore_bounds(run, batch, &blended, d);
 }
 
-void msfp_row_reached_columns(msfp_run *run, msfp_group *group)
+void msfp_row_reached_columns(msfp_run *run, msfp_parameter_batch *batch)
 {
-    const msfp_trail *trail = &run->gradients->trail;
+    const msfp_stage_history *stage_history = &run->gradients->stage_history;
     const int last = msfp_last_stage(run);
-    if (group->end_known)
+    if (batch->end_known)
         return;
-    msfp_complete_columns(run, group);
-    msfp_record_columns(&run->parameters, &group->parameters, &trail->stage[last].at, &group->point,
-                        &trail->work[last], &group->work, group->end_row);
-    memcpy(group->end_row[MSFP_ROW_WORK], group->next.work, sizeof group->next.work);
-    group->end_known = 1;
+    msfp_complete_columns(run, batch);
+    msfp_record_columns(&run->parameters, &batch->parameters, &stage_history->stage[last].at, &batch->point,
+                        &stage_history->work[last], &batch->work, batch->end_row);
+    memcpy(batch->end_row[MSFP_ROW_WORK], batch->next.work, sizeof batch->next.work);
+    batch->end_known = 1;
 }
 
-void msfp_row_of_cubic_columns(msfp_run *run, msfp_group *group, double share, msfp_row *row, msfp_row_columns d)
+void msfp_row_of_cubic_columns(msfp_run *run, msfp_parameter_batch *batch, double share, msfp_row *row,
+                               msfp_row_columns d)
 {
-    const msfp_state_columns *a = &group->now, *b = &group->next;
-    msfp_state_columns *ds = &group->node[0];
+    const msfp_state_columns *a = &batch->now, *b = &batch->next;
+    msfp_state_columns *ds = &batch->node[0];
     const double h = run->next.t - run->now.t;
     msfp_state s;
     msfp_interpolate(run, share, &s);
@@ -213,8 +215,8 @@ void msfp_row_of_cubic_columns(msfp_run *run, msfp_group *group, double share, m
                  MSFP_COLUMN_NUMBERS(ds, q));
     msfp_hermite(MSFP_COLUMN_NUMBERS(a, v), MSFP_COLUMN_NUMBERS(a, a), MSFP_COLUMN_NUMBERS(b, v), MSFP_COLUMN_NUMBERS(b, a), h, share, MSFP_INTEGRATED_MOTION * C,
                  MSFP_COLUMN_NUMBERS(ds, v));
-    accelerations_inside(group, share, ds);
+    accelerations_inside(batch, share, ds);
     msfp_observe_state(run, &s, row);
-    msfp_observe_columns(run, group, &s, ds, d);
+    msfp_observe_columns(run, batch, &s, ds, d);
 }
 #endif

@@ -12,49 +12,50 @@
 enum { WORKS = MSFP_WORKS };
 
 /* work += columns of h weight power */
-MSFP_INLINE void add_product(const msfp_group *group, double h, double weight, double power, const double *dpower,
-                             double *work)
+MSFP_INLINE void add_product(const msfp_parameter_batch *batch, double h, double weight, double power,
+                             const double *dpower, double *work)
 {
     for (int c = 0; c < C; ++c)
-        work[c] += weight * (h * dpower[c] + group->h[c] * power);
+        work[c] += weight * (h * dpower[c] + batch->h[c] * power);
 }
 
 /* As refine_integrals of implicit.c. */
-static void refine(const msfp_run *run, const msfp_group *group, const msfp_tableau *method, double h,
+static void refine(const msfp_run *run, const msfp_parameter_batch *batch, const msfp_tableau *method, double h,
                    const msfp_state_columns *stages, msfp_columns work[WORKS])
 {
-    const msfp_trail *trail = &run->gradients->trail;
+    const msfp_stage_history *stage_history = &run->gradients->stage_history;
     for (int j = 0; j < method->stages && method->order <= 3.0; ++j) {
-        const msfp_state *state = &trail->state[j];
-        if (trail->ringing)
-            add_product(group, h, -method->e[j], state->prescribed_power, stages[j].prescribed_power,
+        const msfp_state *state = &stage_history->state[j];
+        if (stage_history->ringing)
+            add_product(batch, h, -method->e[j], state->prescribed_power, stages[j].prescribed_power,
                         work[MSFP_WORK_INPUT]);
-        for (int e = 0; e < WORKS && !trail->ringing; ++e)
+        for (int e = 0; e < WORKS && !stage_history->ringing; ++e)
             if (e != MSFP_WORK_FRICTION_STORED)
-                add_product(group, h, -method->e[j], state->power[e], stages[j].power[e], work[e]);
+                add_product(batch, h, -method->e[j], state->power[e], stages[j].power[e], work[e]);
     }
 }
 
-MSFP_COLUMNWISE void msfp_stage_works(msfp_run *run, msfp_group *group, int i, const msfp_state_columns *from,
+MSFP_COLUMNWISE void msfp_stage_works(msfp_run *run, msfp_parameter_batch *batch, int i, const msfp_state_columns *from,
                                       msfp_state_columns *stages)
 {
     const msfp_tableau *method = msfp_tableau_of(run->options.method);
-    const msfp_trail *trail = &run->gradients->trail;
-    const msfp_stage *stage = &trail->stage[i];
+    const msfp_stage_history *stage_history = &run->gradients->stage_history;
+    const msfp_stage *stage = &stage_history->stage[i];
     const double h = stage->beta / method->gamma;
     msfp_state_columns *to = &stages[i];
-    msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, &group->point, &stage->seed,
-                           &trail->work[i], &trail->slopes[i], MSFP_OF_RESIDUAL | MSFP_OF_ROW, &group->work);
-    msfp_columns_of_powers(&run->parameters, &group->parameters, &stage->at, &group->point, &trail->work[i],
-                           &group->work, to);
+    msfp_condensed_columns(&run->parameters, &batch->parameters, &stage->at, &batch->point, &stage->seed,
+                           &stage_history->work[i], &stage_history->slopes[i], MSFP_OF_RESIDUAL | MSFP_OF_ROW,
+                           &batch->work);
+    msfp_columns_of_powers(&run->parameters, &batch->parameters, &stage->at, &batch->point, &stage_history->work[i],
+                           &batch->work, to);
     for (int e = 0; e < WORKS; ++e) {
         memcpy(to->work[e], from->work[e], sizeof to->work[e]);
-        add_product(group, h, method->gamma, trail->state[i].power[e], to->power[e], to->work[e]);
+        add_product(batch, h, method->gamma, stage_history->state[i].power[e], to->power[e], to->work[e]);
     }
     if (i < method->stages - 1)
         return;
-    refine(run, group, method, h, stages, to->work);
-    group->complete = 1;
+    refine(run, batch, method, h, stages, to->work);
+    batch->complete = 1;
 }
 
 #if MSFP_CLOSED_FORM
@@ -62,23 +63,23 @@ MSFP_COLUMNWISE void msfp_stage_works(msfp_run *run, msfp_group *group, int i, c
 
 enum { ANGLE = 1 };
 
-/* What the work of the next step uses of the end of this one, at the point and evaluation of the group. */
-static void ends(const msfp_group *group, const msfp_state_columns *before, msfp_history_columns *to)
+/* What the work of the next step uses of the end of this one, at the point and evaluation of the batch. */
+static void ends(const msfp_parameter_batch *batch, const msfp_state_columns *before, msfp_history_columns *to)
 {
-    const msfp_point_columns *dat = &group->point;
+    const msfp_point_columns *dat = &batch->point;
     memcpy(to->power, before->power, sizeof to->power);
     memcpy(to->load, dat->load, sizeof to->load);
     memcpy(to->tilt, dat->base[0][3 + ANGLE], sizeof to->tilt);
-    msfp_get_polar(group->work.body[NB] + MSFP_BODY_CX * C, to->top);
+    msfp_get_polar(batch->work.body[NB] + MSFP_BODY_CX * C, to->top);
     msfp_add_columns(to->top, dat->base[0], -1.0, 3);
     for (int k = 0; k < NB; ++k) {
         msfp_add_columns(&to->tilt, &dat->q[k][ANGLE], 1.0, 1);
-        memcpy(to->normal[k], group->work.contact[k] + MSFP_CONTACT_N * C, sizeof to->normal[k]);
+        memcpy(to->normal[k], batch->work.contact[k] + MSFP_CONTACT_N * C, sizeof to->normal[k]);
     }
 }
 
 /* As friction_work of quasistatic.c. */
-static void friction_work(const msfp_run *run, const msfp_group *group, const msfp_history_columns *to,
+static void friction_work(const msfp_run *run, const msfp_parameter_batch *batch, const msfp_history_columns *to,
                           msfp_columns work[WORKS])
 {
     for (int k = 0; k < NB; ++k) {
@@ -89,12 +90,13 @@ static void friction_work(const msfp_run *run, const msfp_group *group, const ms
         };
         double dslip[MSFP_SLIP_SIZE * C] = { 0 }, dend[MSFP_SLIP_END_SIZE * C], done[MSFP_SLIP_WORK_SIZE * C];
         for (int c = 0; c < C; ++c) {
-            dslip[MSFP_SLIP_Y * C + c] = group->now.f[k][0][c];
-            dslip[MSFP_SLIP_TURN * C + c] = group->next.q[k][ANGLE][c] - group->now.q[k][ANGLE][c];
-            dend[MSFP_SLIP_END_Y * C + c] = group->next.f[k][0][c];
-            dend[MSFP_SLIP_END_N * C + c] = 0.5 * (group->history.normal[k][c] + to->normal[k][c]);
+            dslip[MSFP_SLIP_Y * C + c] = batch->now.f[k][0][c];
+            dslip[MSFP_SLIP_TURN * C + c] = batch->next.q[k][ANGLE][c] - batch->now.q[k][ANGLE][c];
+            dend[MSFP_SLIP_END_Y * C + c] = batch->next.f[k][0][c];
+            dend[MSFP_SLIP_END_N * C + c] = 0.5 * (batch->history.normal[k][c] + to->normal[k][c]);
         }
-        msfp_slip_work_direction(run->parameters.surface[k], slip, end, group->parameters.surface[k], dslip, dend, done);
+        msfp_slip_work_direction(run->parameters.surface[k], slip, end, batch->parameters.surface[k], dslip, dend,
+                                 done);
         msfp_add_columns(&work[MSFP_WORK_FRICTION_STORED], (const msfp_columns *)done + MSFP_SLIP_WORK_STORED, 1.0, 1);
         msfp_add_columns(&work[MSFP_WORK_FRICTION_DISSIPATED], (const msfp_columns *)done + MSFP_SLIP_WORK_LOST, 1.0, 1);
     }
@@ -109,10 +111,11 @@ MSFP_INLINE void add_mean(double force_a, const double *dforce_a, double force_b
 }
 
 /* As load_work of quasistatic.c. */
-static void load_work(const msfp_run *run, const msfp_group *group, const msfp_history_columns *db, double *input)
+static void load_work(const msfp_run *run, const msfp_parameter_batch *batch, const msfp_history_columns *db,
+                      double *input)
 {
     const msfp_step_history *a = &run->step_history, *b = &run->next_step_history;
-    const msfp_history_columns *da = &group->history;
+    const msfp_history_columns *da = &batch->history;
     enum { TURN = 3 + ANGLE };
     add_mean(a->load[TURN], da->load[TURN], b->load[TURN], db->load[TURN], a->tilt, da->tilt, b->tilt, db->tilt, input);
     for (int i = 0; i < 3; ++i)
@@ -120,45 +123,45 @@ static void load_work(const msfp_run *run, const msfp_group *group, const msfp_h
 }
 
 /* As count_work of quasistatic.c: lengths of these steps do not depend on the parameters. */
-void msfp_quasistatic_works(msfp_run *run, msfp_group *group)
+void msfp_quasistatic_works(msfp_run *run, msfp_parameter_batch *batch)
 {
-    const msfp_trail *trail = &run->gradients->trail;
+    const msfp_stage_history *stage_history = &run->gradients->stage_history;
     const double h = run->next.t - run->now.t, last = run->step_history.h, curved = h * h * h / 6.0;
-    const msfp_state_columns *now = &group->now;
-    msfp_state_columns *next = &group->next;
+    const msfp_state_columns *now = &batch->now;
+    msfp_state_columns *next = &batch->next;
     msfp_columns *work = next->work;
     msfp_history_columns reached;
-    msfp_columns_of_powers(&run->parameters, &group->parameters, &trail->stage[1].at, &group->point, &trail->work[1],
-                           &group->work, next);
+    msfp_columns_of_powers(&run->parameters, &batch->parameters, &stage_history->stage[1].at, &batch->point,
+                           &stage_history->work[1], &batch->work, next);
     msfp_add_columns(&next->power[MSFP_WORK_INPUT], (const msfp_columns *)&next->load_power, -1.0, 1);
     for (int e = 0; e < WORKS; ++e)
         for (int c = 0; c < C && e != MSFP_WORK_FRICTION_DISSIPATED && e != MSFP_WORK_FRICTION_STORED; ++c) {
-            const double a = now->power[e][c], b = next->power[e][c], before = group->history.power[e][c];
+            const double a = now->power[e][c], b = next->power[e][c], before = batch->history.power[e][c];
             const double bend = last > 0.0 ? ((b - a) / h - (a - before) / last) / (h + last) : 0.0;
             work[e][c] += 0.5 * h * (a + b) - bend * curved;
         }
-    ends(group, now, &reached);
-    friction_work(run, group, &reached, work);
-    load_work(run, group, &reached, work[MSFP_WORK_INPUT]);
-    group->history = reached;
+    ends(batch, now, &reached);
+    friction_work(run, batch, &reached, work);
+    load_work(run, batch, &reached, work[MSFP_WORK_INPUT]);
+    batch->history = reached;
 }
 #endif
 
-void msfp_initial_works(msfp_run *run, msfp_group *group, const msfp_point *at, const msfp_seed *seed,
+void msfp_initial_works(msfp_run *run, msfp_parameter_batch *batch, const msfp_point *at, const msfp_seed *seed,
                         const double g[NB][2])
 {
-    msfp_trail *trail = &run->gradients->trail;
-    const msfp_work *w = &trail->work[0];
-    msfp_state_columns *now = &group->now;
-    msfp_contact_slopes(&run->parameters, seed, w, g, 1, &trail->slopes[0]);
-    msfp_condensed_columns(&run->parameters, &group->parameters, at, &group->point, seed, w, &trail->slopes[0],
-                           MSFP_OF_RESIDUAL | MSFP_OF_ROW, &group->work);
-    msfp_columns_of_powers(&run->parameters, &group->parameters, at, &group->point, w, &group->work, now);
+    msfp_stage_history *stage_history = &run->gradients->stage_history;
+    const msfp_work *w = &stage_history->work[0];
+    msfp_state_columns *now = &batch->now;
+    msfp_contact_slopes(&run->parameters, seed, w, g, 1, &stage_history->slopes[0]);
+    msfp_condensed_columns(&run->parameters, &batch->parameters, at, &batch->point, seed, w, &stage_history->slopes[0],
+                           MSFP_OF_RESIDUAL | MSFP_OF_ROW, &batch->work);
+    msfp_columns_of_powers(&run->parameters, &batch->parameters, at, &batch->point, w, &batch->work, now);
 #if MSFP_CLOSED_FORM
     if (!msfp_is_quasistatic(run))
         return;
     msfp_add_columns(&now->power[MSFP_WORK_INPUT], (const msfp_columns *)&now->load_power, -1.0, 1);
-    ends(group, now, &group->history);
+    ends(batch, now, &batch->history);
 #endif
 }
 #endif

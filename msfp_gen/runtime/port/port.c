@@ -104,7 +104,8 @@ int msfp_port_enter(msfp_port *port, const msfp_options *options, const double *
         msfp_port_wrench_of(port, run, &port->from, port->wrench);
     if (monitor_heat)
         memcpy(run->monitor.heat, monitor_heat, sizeof run->monitor.heat);
-    port->tried = port->ready = port->step.finished = port->step.moved = 0;
+    port->trial_state = NO_TRIAL;
+    port->step.finished = port->step.moved = 0;
     port->step.stage = MSFP_NO_STEP;
     return status;
 }
@@ -155,13 +156,13 @@ int msfp_port_trial(msfp_port *port, double t, const double *to)
 {
     msfp_run *run = &port->run;
     memcpy(&port->to, to, sizeof port->to);
-    port->tried = port->ready = 0;
+    port->trial_state = NO_TRIAL;
     port->step.stage = MSFP_NO_STEP;
     port->step.finished = 0;
     port->time_count = 0;
     if (t == port->committed.now.t) {
         copy_state(run, &port->committed);
-        port->ready = 1;
+        port->trial_state = TRIAL_OF_NO_DURATION;
         return MSFP_OK;
     }
     msfp_port_prepare(port, run, t, &port->to);
@@ -171,11 +172,14 @@ int msfp_port_trial(msfp_port *port, double t, const double *to)
         if (run->counts[MSFP_COUNT_STEPS] > before && run->status == MSFP_OK)
             run->status = record_time(port);
     }
-    port->tried = port->ready = run->status == MSFP_OK;
+    port->trial_state = run->status == MSFP_OK ? TRIAL_SOLVED : NO_TRIAL;
     return run->status;
 }
 
-static const msfp_run *current(const msfp_port *port) { return port->tried ? &port->run : &port->committed; }
+static const msfp_run *current(const msfp_port *port)
+{
+    return port->trial_state == TRIAL_SOLVED ? &port->run : &port->committed;
+}
 
 const msfp_row *msfp_port_row(const msfp_port *port)
 {
@@ -185,7 +189,7 @@ const msfp_row *msfp_port_row(const msfp_port *port)
 
 void msfp_port_wrench(const msfp_port *port, double *wrench)
 {
-    if (port->tried)
+    if (port->trial_state == TRIAL_SOLVED)
         msfp_port_wrench_of(port, &port->run, &port->to, wrench);
     else
         memcpy(wrench, port->wrench, sizeof port->wrench);
@@ -193,15 +197,15 @@ void msfp_port_wrench(const msfp_port *port, double *wrench)
 
 int msfp_port_commit(msfp_port *port)
 {
-    if (!port->ready)
+    if (port->trial_state == NO_TRIAL)
         return MSFP_E_ARGUMENT;
-    if (port->tried) {
+    if (port->trial_state == TRIAL_SOLVED) {
         msfp_port_wrench(port, port->wrench);
         port->committed.rows[0] = *msfp_port_row(port);
         copy_state(&port->committed, &port->run);
         port->from = port->to;
     }
-    port->tried = port->ready = 0;
+    port->trial_state = NO_TRIAL;
     return MSFP_OK;
 }
 
@@ -209,7 +213,7 @@ void msfp_port_revert(msfp_port *port)
 {
     port->step.stage = MSFP_NO_STEP;
     port->step.finished = 0;
-    port->tried = port->ready = 0;
+    port->trial_state = NO_TRIAL;
     port->time_count = 0;
     copy_state(&port->run, &port->committed);
 }

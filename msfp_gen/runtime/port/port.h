@@ -61,8 +61,8 @@ struct msfp_port {
     double plate[3];   /* r_nn at rest, where end B is with u = 0 [m] */
     double *times;     /* [time_count]: ends of the steps of the trial [s] */
     size_t time_count, time_capacity;
-    int tried; /* a trial has succeeded since the last commit, revert or failure */
-    int ready; /* it may be committed: the same, or a trial of no duration */
+    /* Since the last commit, revert or failure; a trial of no duration has no steps, but may be committed. */
+    enum { NO_TRIAL, TRIAL_OF_NO_DURATION, TRIAL_SOLVED } trial_state;
     msfp_port_step step;
 };
 

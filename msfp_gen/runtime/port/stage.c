@@ -35,7 +35,7 @@ void msfp_port_step_begin(msfp_port *port, double h, const double *expected)
         run->now.energy + msfp_port_move_anchor(port, run, run->rows[0].top, port->from.of[1][0], port->step.anchor);
     port->step.stage = port->step.finished = 0;
     port->step.solved = 1;
-    port->tried = port->ready = 0;
+    port->trial_state = NO_TRIAL;
     run->status_surface = 0;
     run->status_value = 0.0;
     msfp_stages_begin(run, &port->step.stages, h);

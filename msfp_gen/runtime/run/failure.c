@@ -75,7 +75,7 @@ static int lift_off_imminent(msfp_run *run)
             msfp_surface_in_tension(&w)) {
             const int surface = msfp_surface_in_tension(&w);
             double p[3];
-            msfp_local_p_get(w.local[surface - 1], p);
+            msfp_contact_frame_p_get(w.contact_frame[surface - 1], p);
             return failed_at(run, surface, p[2]);
         }
     }

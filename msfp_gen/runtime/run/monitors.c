@@ -24,7 +24,7 @@ int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
     }
     for (int j = 0; j < NB; ++j) {
         double p[3];
-        msfp_local_p_get(w->local[j], p);
+        msfp_contact_frame_p_get(w->contact_frame[j], p);
         if (!(fabs(s->q[j][0]) + fabs(s->q[j][1]) + fabs(s->q[j][2]) < INFINITY) || !(fabs(p[2]) < INFINITY)) {
             run->status_surface = j + 1;
             return MSFP_E_FINITE;

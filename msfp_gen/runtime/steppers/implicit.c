@@ -179,12 +179,12 @@ void msfp_stages_begin(msfp_run *run, msfp_stages *s, double h)
     s->other = 0.0;
     s->now.beta = beta;
     s->now.inertia = 1.0;
-    s->now.seed.cq = s->now.seed.beta = beta;
-    s->now.seed.cv = 1.0;
+    s->now.seed.q_weight = s->now.seed.beta = beta;
+    s->now.seed.v_weight = 1.0;
 #if MSFP_CLOSED_FORM
     s->now.seed.closed_form = 0;
 #endif
-    s->now.seed.ca = 1.0 / beta;
+    s->now.seed.a_weight = 1.0 / beta;
     s->now.seed.accuracy = 1e-5 * run->options.rtol;
     memset(s->now.at.a, 0, sizeof s->now.at.a);
     s->stage[0] = run->now;

@@ -138,8 +138,8 @@ static double take_step(msfp_run *run, msfp_stage *s, double *residual, double *
 void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
 {
     double residual[DOF], step[DOF];
-    const double with_inertia = s->seed.ca;
-    s->inertia = s->seed.ca = 0.0;
+    const double with_inertia = s->seed.a_weight;
+    s->inertia = s->seed.a_weight = 0.0;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     for (int i = 0; i < 10 && size > 1e-2 && size < INFINITY; ++i) {
         if (msfp_factorise_stage(run, s, residual, &size))
@@ -147,7 +147,7 @@ void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
         size = take_step(run, s, residual, step, size, 1);
     }
     s->inertia = 1.0;
-    s->seed.ca = with_inertia;
+    s->seed.a_weight = with_inertia;
     run->factored_beta = 0.0;
 }
 

@@ -54,8 +54,8 @@ static void parabola(const msfp_run *run, msfp_stage *s, double h)
         s->seed.slip[k][MSFP_SLIP_TURN] = s->from.q[k][ANGLE] - now;
         s->seed.slip[k][MSFP_SLIP_BETA] = s->beta;
     }
-    s->seed.cq = s->seed.beta = s->beta;
-    s->seed.cv = 1.0;
+    s->seed.q_weight = s->seed.beta = s->beta;
+    s->seed.v_weight = 1.0;
     s->seed.closed_form = 1;
 }
 
