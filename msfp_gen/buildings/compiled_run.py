@@ -207,6 +207,11 @@ class BuildingRun:
         return self.run.time
 
     @property
+    def status(self) -> tuple[str, int, int, float]:
+        """As of `Run`."""
+        return self.run.status
+
+    @property
     def extremes(self) -> BuildingExtremes:
         """Extremes over all steps."""
         return BuildingExtremes.of_run(self.scene, self.run.peaks, [member.shapes for member in self.members])
@@ -233,7 +238,7 @@ class BuildingRun:
 
         False: it has not (docs/effects.md).
         """
-        status, failed, surface, value = self.run.status
+        status, failed, surface, value = self.status
         if status == "ok" or not self.run.row_count:
             return False
         own = range(len(self.members)) if status == "guard" else [failed - 1] if failed else []

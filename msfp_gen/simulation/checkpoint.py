@@ -64,6 +64,10 @@ class Resumable(Protocol):
         """Time reached [s]."""
 
     @property
+    def status(self) -> tuple[Any, ...]:
+        """Its name, and what is known of a failure."""
+
+    @property
     def dropped_rows(self) -> int:
         """Number of rows that it no longer holds."""
 

@@ -1,19 +1,24 @@
 """`simulate`: runs a scene and returns its result. The time integration is compiled C.
 
 The run of a bearing is one segment, or several: where a monitor trips, the next one continues with a model that has
-the effect.
+the effect. That of a building changes the models of its bearings by itself.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
+from msfp_gen.buildings.compiled_run import BuildingRun
+from msfp_gen.buildings.compiled_run import result_of as building_result
+from msfp_gen.buildings.compiled_run import start_run as start_building
+from msfp_gen.buildings.dataset import scene_text
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
@@ -24,13 +29,14 @@ from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.results.restart_state import RestartState
 from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of
 from msfp_gen.scene.effect_switching import check, next_effects, stopping_monitors
+from msfp_gen.scene.file.loader import dumps
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import is_sprung
-from msfp_gen.simulation.building_run import simulate_building
 from msfp_gen.simulation.checkpoint import (
     EVERY,
     Checkpoint,
     Identity,
+    Resumable,
     checkpoint_files,
     require_no_checkpoint,
     segment_file,
@@ -45,7 +51,15 @@ from msfp_gen.simulation.gradients import (
     with_gradient_errors,
 )
 from msfp_gen.simulation.memory import outgrown, require_room
-from msfp_gen.simulation.outcome import Progress, extremes_of, history_notes, landing_notes, message_of, provenance_of
+from msfp_gen.simulation.outcome import (
+    Progress,
+    extremes_of,
+    history_notes,
+    landing_notes,
+    message_of,
+    provenance_of,
+    stopped,
+)
 from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
 from msfp_gen.simulation.segment import Segment, start_run, start_temperatures
 from msfp_gen.simulation.settling import (
@@ -65,7 +79,9 @@ if TYPE_CHECKING:
     from msfp_gen.scene.parameters import Parameter
     from msfp_gen.specification.layout import Effects
 
-STEPS_PER_CALL = 4000  # of the compiled run, without the GIL; Ctrl-C, progress and checkpoints are handled in between
+# Of the compiled runs of a bearing, and of a building, without the GIL; Ctrl-C, progress and checkpoints are handled in
+# between.
+STEPS_PER_CALL, BUILDING_STEPS_PER_CALL = 4000, 20
 CheckpointOptions = tuple[Path | None, float, bool]  # file, seconds between checkpoints, whether to resume
 NO_CHECKPOINT: CheckpointOptions = (None, EVERY, False)
 
@@ -179,7 +195,7 @@ def simulate(
         }  # fmt: skip
         if unknown := [name for name, value in options.items() if value]:
             raise InputError(f"{unknown[0]}: the run of a building has no such option; leave it out")
-        return simulate_building(scene, progress, checkpoint, every, resume, threads)
+        return _simulate_building(scene, progress, checkpoint, every, resume, threads)
     if not isinstance(scene, Scene):
         raise InputError(f"scene: a {type(scene).__name__} is no scene; give what load_scene returns")
     if threads is not None:
@@ -319,43 +335,50 @@ def _segment(sequence: RunSequence, progress: Progress | None, options: Checkpoi
     ready = time.perf_counter()
     earlier = sum(segment.run.row_count for segment in sequence.segments)
     copies = 1 + len(sequence.parameters)
-    status = _advance(run, scene, earlier, copies, progress, checkpoint, stored) or run.status[0]
+    surfaces = scene.bearing.layout.surfaces
+
+    def step() -> bool:
+        return run.advance(STEPS_PER_CALL, 0 if stored is None else ROWS_HELD)
+
+    def is_full() -> bool:
+        return outgrown(copies * (earlier + run.row_count), surfaces)
+
+    status = _advance(run, step, scene.end, progress, checkpoint, stored, is_full)
     wall = time.perf_counter() - ready + (checkpoint.wall if checkpoint is not None else 0.0)
     return Segment(model, run, azimuth, status, wall, ready - start, stored)
 
 
 def _advance(
-    run: Run,
-    scene: Scene,
-    earlier: int,
-    copies: int,
+    run: Resumable,
+    step: Callable[[], bool],
+    end: float,
     progress: Progress | None,
     checkpoint: Checkpoint | None,
-    stored: RowFile | None,
-) -> str | None:
-    """Take all steps; "interrupted" after Ctrl-C, "memory" where no more rows fit, else None.
+    rows: RowFile | None = None,
+    is_full: Callable[[], bool] | None = None,
+) -> str:
+    """Take all steps of a run; its status: "interrupted" after Ctrl-C, "memory" where it is full.
 
-    earlier: number of rows of the segments before. copies: numbers kept of each quantity. stored: takes the rows of a
-    run that streams them.
+    step: some steps; False: they were the last. end: of the run [s]. rows: take those of a run that streams them.
     """
-    status, surfaces = None, scene.bearing.layout.surfaces
+    status = ""
     try:
-        while run.advance(STEPS_PER_CALL, 0 if stored is None else ROWS_HELD):
-            if stored is not None:
-                stored.take(run)
-            elif outgrown(copies * (earlier + run.row_count), surfaces):
+        while step():
+            if rows is not None:
+                rows.take(run)  # type: ignore[arg-type]
+            elif is_full is not None and is_full():
                 status = "memory"
                 break
             if checkpoint is not None:
-                checkpoint.save_if_due(run, stored)
+                checkpoint.save_if_due(run, rows)
             if progress is not None:
-                progress(run.time, scene.end)
+                progress(run.time, end)
     except KeyboardInterrupt:
         status = "interrupted"
     # After a failure the last checkpoint is kept: resumed from there, the run fails again in the same way.
     if checkpoint is not None and run.status[0] in ("ok", "stopped"):
-        checkpoint.save(run, stored)
-    return status
+        checkpoint.save(run, rows)
+    return status or str(run.status[0])
 
 
 def _result(sequence: RunSequence, history: History) -> Result:
@@ -379,3 +402,41 @@ def _result(sequence: RunSequence, history: History) -> Result:
         recorded_extremes=extremes_of(segments),
         gradients=run_gradients(sequence, len(history.time), events),
     )
+
+
+def _simulate_building(
+    scene: BuildingScene,
+    progress: Progress | None,
+    checkpoint: str | Path | None,
+    every: float,
+    resume: bool,
+    threads: int | None,
+) -> BuildingResult:
+    """`simulate` of a building; the RunError names the bearing."""
+    begin = time.monotonic()
+    run = start_building(scene, threads)
+    saved = None if checkpoint is None else Checkpoint(checkpoint, _building_identity(run), every, resume)
+    if saved is not None:
+        saved.restore(run)
+    status = _advance(run, lambda: run.run.advance(BUILDING_STEPS_PER_CALL) or run.switch(), scene.end, progress, saved)
+    message = "" if status == "ok" else _building_message(run, status)
+    result = None
+    if status == "ok" or run.run.row_count:
+        about = provenance_of(scene.solver, ", ".join(spec.key for spec in scene.specs))
+        ended: dict[str, Any] = {"status": status, "message": message, "wall_time": time.monotonic() - begin}
+        result = replace(building_result(run), provenance=about, **ended)
+    if result is None or message:
+        raise RunError(message, status=status, result=result)
+    return result
+
+
+def _building_message(run: BuildingRun, status: str) -> str:
+    """One line with bearing, time, surface, cause and remedy."""
+    _, bearing, surface, value = run.status
+    who = run.scene.label(bearing - 1) if bearing else "building"
+    return f"{who}: {stopped(run.time, run.scene.end, status, surface, value)}"
+
+
+def _building_identity(run: BuildingRun) -> Identity:
+    motion = {"name": run.scene.motion.name, "duration": run.scene.motion.duration}
+    return Identity(run.build, scene_text(run.scene) + dumps({"motion": motion}), fingerprint(run.scene))

@@ -13,8 +13,6 @@ from support.buildings import BEARING, INTERFACE, LOAD, MOTION, frame, scene
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, InputError, Motion, RunError, simulate
 from msfp_gen.buildings.compiled_run import result_of, start_run
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.simulation import building_run
-from msfp_gen.simulation.building_run import simulate_building
 
 EVENTFUL = scene(frame(), duration=0.8)
 
@@ -32,7 +30,7 @@ def test_results_do_not_depend_on_the_number_of_threads():
 @pytest.mark.parametrize("effects", [None, Effects(uplift=True)], ids=["default", "uplift"])
 def test_a_restored_run_continues_bit_by_bit(effects):
     made = replace(EVENTFUL, bearings=[replace(each, effects=effects) for each in EVENTFUL.bearings], duration=0.3)
-    whole = simulate_building(made)
+    whole = simulate(made)
     begun = start_run(made)
     begun.run.advance(whole.counters["steps"] // 2)
     snapshot = begun.run.snapshot()
@@ -154,9 +152,9 @@ def test_a_run_that_fails_before_its_first_row_has_no_result(monkeypatch):
         compiled = SimpleNamespace(
             rows=(), row_count=0, status=("newton", 1, 0, 0.0), time=0.0, advance=lambda steps: False
         )
-        return SimpleNamespace(scene=made, run=compiled, time=0.0, switch=lambda: False)
+        return SimpleNamespace(scene=made, run=compiled, time=0.0, status=compiled.status, switch=lambda: False)
 
-    monkeypatch.setattr(building_run, "start_run", failed)
+    monkeypatch.setattr("msfp_gen.simulation.simulate.start_building", failed)
     with pytest.raises(RunError, match="bearing 1: stopped at t = 0 s") as caught:
         simulate(scene(frame()))
     assert caught.value.result is None
