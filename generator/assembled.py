@@ -90,7 +90,7 @@ def assembled() -> dict[str, sp.Expr]:
     R, zero = symbol("R_1"), sp.Integer(0)
     lower, plate = evaluate(p["body_block"], **body(1, zero, R)), evaluate(p["body_block"], **body(2, R, zero))
     surface = {"sign": sp.Integer(1), "R": R, "mu": symbol("mu_1"), "dy": symbol("d_1"), "td": zero}
-    found: dict[tuple[str, int], dict[str, sp.Expr]] = {
+    lists: dict[tuple[str, int], dict[str, sp.Expr]] = {
         ("frame", 0): ground_motion(),
         ("x", 0): coordinates(1),
         ("x", 1): coordinates(2),
@@ -106,10 +106,10 @@ def assembled() -> dict[str, sp.Expr]:
     }
     for name, reads, writes in unrolled(passes_of(momentum_balances(spec.effects)), spec.layout.signs):
         aliases = [use.alias for use in p[name].inputs]
-        result = evaluate(p[name], **dict(zip(aliases, (found[place] for place in reads), strict=True)))
-        found |= dict.fromkeys(writes, result)  # each list takes the fields that it has
-    balances = found["balances", 1]
-    return {"E1": balances["Fx"], "E3": balances["Fz"], "t2": balances["My"], "dY": found["report_contact", 0]["dY"]}
+        result = evaluate(p[name], **dict(zip(aliases, (lists[place] for place in reads), strict=True)))
+        lists |= dict.fromkeys(writes, result)  # each list takes the fields that it has
+    balances = lists["balances", 1]
+    return {"E1": balances["Fx"], "E3": balances["Fz"], "t2": balances["My"], "dY": lists["report_contact", 0]["dY"]}
 
 
 def readable(expression: sp.Expr) -> sp.Expr:

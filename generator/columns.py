@@ -232,7 +232,7 @@ def local_variation(b: Blocks, c: Columns, unknowns: tuple[str, ...]) -> Program
             axis = up["t1"] if angle == "psi" else body["t2"]  # (2.4), (2.5)
             turning = p.let_vector(scale(s["s0"], axis))
         turned = p.let_vector(cross(turning, force["F"]))
-        found = {
+        quantities = {
             "dw": p.rate_vector(slip),
             "tilt": p.rate(tilt),
             "p": project(below, turned),
@@ -241,7 +241,7 @@ def local_variation(b: Blocks, c: Columns, unknowns: tuple[str, ...]) -> Program
             "wp": wp,
             "alp": alp,
         }
-        out |= {f"{angle}_{name}": found[name] for name in c.variation.quantities}
+        out |= {f"{angle}_{name}": quantities[name] for name in c.variation.quantities}
     p.write(c.variations, out, tangents=False)
     return p
 

@@ -151,13 +151,13 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
     g: Symbols = p.read(b.shear, "g")
     f = {name: p.let(g[name] - stage["rest"] * (g[name] - stage[name])) for name in ("Y", "Z")}
     shear = Shear(f["Y"], f["Z"], (stage["Y"], stage["Z"]), stage["tau"], p.let(1 - stage["rest"]))
-    given = laws.read_unknown_coefficient(p, b, friction_model.coefficient, par)
-    N, (sp_, cp_, st_, ct_) = closed_form(p, given, loc["p"], g)
+    unknown = laws.read_unknown_coefficient(p, b, friction_model.coefficient, par)
+    N, (sp_, cp_, st_, ct_) = closed_form(p, unknown, loc["p"], g)
     base = contact_basis(p, sp_, cp_, st_, ct_)
     signed_radius, rates = slip(p, friction_model, par, base, shear, loc["dw"])
-    out = {**rates, **friction(p, friction_model, given, base, N, g, loc["dw"], signed_radius)}
+    out = {**rates, **friction(p, friction_model, unknown, base, N, g, loc["dw"], signed_radius)}
     law = friction_model.coefficient
-    out |= laws.law_results(p, law, par, given, stage, loc, N, shear.kept, rates)
+    out |= laws.law_results(p, law, par, unknown, stage, loc, N, shear.kept, rates)
     values = {**out, **f, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_}
     p.write(
         b.contact,
@@ -176,8 +176,8 @@ def contact_stage(b: Blocks) -> Program:
     before: Symbols = p.read(b.before, "f", active=False)
     tau = p.let(before["beta"] + par["td"])
     rest = Select(tau, par["td"] / p.let(Select(tau, tau, 1)), 1)
-    given = {name: before[name] for name in b.stage.quantities if name not in ("tau", "rest")}
-    p.write(b.stage, {**given, "tau": tau, "rest": rest}, tangents=False)
+    copied = {name: before[name] for name in b.stage.quantities if name not in ("tau", "rest")}
+    p.write(b.stage, {**copied, "tau": tau, "rest": rest}, tangents=False)
     return p
 
 

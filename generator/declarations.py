@@ -106,13 +106,13 @@ def fortran(header: str) -> list[str]:
     lines: list[str] = []
     for struct in structs(header):
         lines += ["", f"type, bind(c) :: {struct.name}"]
-        given = any(member.pointer for member in struct.members)
-        lines += [f"   {_fortran_member(member, known, given)}" for member in struct.members]
+        has_defaults = any(member.pointer for member in struct.members)
+        lines += [f"   {_fortran_member(member, known, has_defaults)}" for member in struct.members]
         lines.append("end type")
     return lines
 
 
-def _fortran_member(member: Member, lengths: dict[str, str], given: bool) -> str:
+def _fortran_member(member: Member, lengths: dict[str, str], has_defaults: bool) -> str:
     if member.parameters is not None:
         return f"type(c_funptr) :: {member.name} = c_null_funptr"
     if member.pointer:
@@ -121,5 +121,5 @@ def _fortran_member(member: Member, lengths: dict[str, str], given: bool) -> str
     if kind is None:
         return f"type({member.type}) :: {member.name}"
     sizes = ", ".join(lengths.get(n, n) for n in reversed(member.dimensions))
-    default = f" = {_ZEROS[kind]}" if given else ""
+    default = f" = {_ZEROS[kind]}" if has_defaults else ""
     return f"{kind} :: {member.name}{f'({sizes})' if sizes else ''}{default}"

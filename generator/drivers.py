@@ -96,8 +96,8 @@ class Form:
 
 
 def _form(name: str, suffix: str, schedule: Schedule, kernels: Iterable[Kernel]) -> Form:
-    found = {kernel.program.name.removesuffix(suffix): kernel for kernel in kernels}
-    return Form(name, found, _read_values(schedule, found))
+    kernel_of = {kernel.program.name.removesuffix(suffix): kernel for kernel in kernels}
+    return Form(name, kernel_of, _read_values(schedule, kernel_of))
 
 
 def schedule_context(equations: Equations, directional: Iterable[Kernel], by_ends: Iterable[Kernel]) -> dict[str, Any]:

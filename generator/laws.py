@@ -56,7 +56,7 @@ def add_law_fields(b: Blocks, law: Law | None) -> Blocks:
 
 def _add_memory_fields(b: Blocks, memory: Memory) -> Blocks:
     """The blocks with the fields of what a surface remembers."""
-    given = [
+    fields = [
         Field("past", memory.unit, f"{memory.meaning}: less its start and what the source of this stage contributes"),
         Field("gain", f"({memory.unit})/({memory.source_unit})", "what it contributes, per unit; 0 where it is given"),
     ]
@@ -68,8 +68,8 @@ def _add_memory_fields(b: Blocks, memory: Memory) -> Blocks:
         )
     return replace(
         b,
-        before=with_fields(b.before, given),
-        stage=with_fields(b.stage, given),
+        before=with_fields(b.before, fields),
+        stage=with_fields(b.stage, fields),
         contact=with_fields(b.contact, results),
         report_contact=with_fields(b.report_contact, [source]),
     )
@@ -91,7 +91,7 @@ def law_results(
     p: Program,
     law: Law | None,
     par: Symbols,
-    given: Symbols,
+    unknown: Symbols,
     stage: Symbols,
     loc: Symbols,
     N: sp.Expr,
@@ -108,7 +108,7 @@ def law_results(
         p: program of the contact.
         law: friction law.
         par: symbols of the surface parameters.
-        given: the result of `read_unknown_coefficient`.
+        unknown: the result of `read_unknown_coefficient`.
         stage: symbols of the block `stage`.
         loc: symbols of the block `contact_frame`.
         N: normal force.
@@ -117,7 +117,7 @@ def law_results(
     """
     if law is None:
         return {}
-    c = given["law"]
+    c = unknown["law"]
     variables = law_variables(p, law, par, N, slip["plastic"])
     results: Symbols = {}
     memory = law.memory

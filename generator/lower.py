@@ -59,13 +59,13 @@ class Kernel:
 
 def needed_statements(statements: Sequence[Statement], symbols: set[sp.Symbol]) -> tuple[Statement, ...]:
     """Statements on which the given symbols depend, in order of execution."""
-    found: list[Statement] = []
+    backwards: list[Statement] = []
     needed = set(symbols)
     for statement in reversed(statements):
         if statement.target in needed:
-            found.append(statement)
+            backwards.append(statement)
             needed |= statement.expression.free_symbols
-    return tuple(reversed(found))
+    return tuple(reversed(backwards))
 
 
 def active_inputs(program: Program) -> set[sp.Symbol]:
@@ -158,10 +158,10 @@ def needed_tangents(
 
     A Heaviside switch has no derivative, so the tangents of its argument may be unnecessary.
     """
-    needed, found, used = set(targets), [], set()
+    needed, backwards, used = set(targets), [], set()
     for tangent in reversed(tangents):
         if tangent.target in needed:
-            found.append(tangent)
+            backwards.append(tangent)
             needed |= {source for _, source in tangent.terms}
             used |= {s for partial, _ in tangent.terms for s in partial.free_symbols}
-    return tuple(p for p in partials if p.target in used), tuple(reversed(found))
+    return tuple(p for p in partials if p.target in used), tuple(reversed(backwards))

@@ -79,11 +79,11 @@ def places(v: Symbols, s: Symbols) -> Symbols:
     return {"lo": bottom, "cm": bottom + centroid, "up": top, "sc": top + s["sign_upper"] * s["radius_upper"]}
 
 
-def body_block(b: Blocks, values: ValueBlocks) -> Program:
+def body_block(b: Blocks, scene_values: ValueBlocks) -> Program:
     """Parameters of a body: distances along t3 from the positions (3.4)-(3.11), mass and moments of inertia."""
     p = Program("body_block", "parameters of a body, from (3.4)-(3.11)")
-    v: Symbols = p.read(values.body_values, "b", active=False)
-    s: Symbols = p.read(values.sides, "s", active=False)
+    v: Symbols = p.read(scene_values.body_values, "b", active=False)
+    s: Symbols = p.read(scene_values.sides, "s", active=False)
     points = places(v, s)
     p.write(
         b.body_parameters,
@@ -100,12 +100,12 @@ def body_block(b: Blocks, values: ValueBlocks) -> Program:
     return p
 
 
-def surface_block(b: Blocks, given: ValueBlocks, effects: Effects) -> Program:
+def surface_block(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> Program:
     """Parameters of a surface, of which its slider gives the edge that meets the rim."""
     p = Program("surface_block", "parameters of a surface; with uplift the half-angle of its footprint")
-    v: Symbols = p.read(given.surface_values, "v", active=False)
-    slider: Symbols = p.read(given.body_values, "s", active=False)
-    side: Symbols = p.read(given.side, "side", active=False)
+    v: Symbols = p.read(scene_values.surface_values, "v", active=False)
+    slider: Symbols = p.read(scene_values.body_values, "s", active=False)
+    side: Symbols = p.read(scene_values.side, "side", active=False)
     values = {
         "sign": side["sign"],
         "R": v["radius"],
@@ -130,14 +130,14 @@ def surface_block(b: Blocks, given: ValueBlocks, effects: Effects) -> Program:
     return p
 
 
-def top_block(b: Blocks, given: ValueBlocks, effects: Effects) -> Program:
+def top_block(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> Program:
     """Parameters of the top. With uplift its given springs contain the unilateral contacts, in series (docs/uplift.md).
 
     The damper loses as much in slow motion as the given one.
     """
     p = Program("top_block", "parameters of the top; with uplift its springs less the compliance of the contacts")
-    v: Symbols = p.read(given.top_values, "v", active=False)
-    around: Symbols = p.read(given.around, "a", active=False)
+    v: Symbols = p.read(scene_values.top_values, "v", active=False)
+    around: Symbols = p.read(scene_values.around, "a", active=False)
     sprung = p.let(Select(v["vertical_stiffness"], 1, Select(v["vertical_damping"], 1, 0)))
     anchor = (v["anchor_x"], v["anchor_y"], sp.Integer(0))
     parts = b.top_parameters.quantities["x0"]
@@ -162,6 +162,6 @@ def top_block(b: Blocks, given: ValueBlocks, effects: Effects) -> Program:
     return p
 
 
-def programs(b: Blocks, given: ValueBlocks, effects: Effects) -> list[Program]:
+def programs(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> list[Program]:
     """The programs that make the parameters of a stack from the values of a scene."""
-    return [body_block(b, given), surface_block(b, given, effects), top_block(b, given, effects)]
+    return [body_block(b, scene_values), surface_block(b, scene_values, effects), top_block(b, scene_values, effects)]

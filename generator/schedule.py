@@ -563,7 +563,7 @@ def check(
     passes: Iterable[Pass],
     programs: Mapping[str, Program],
     blocks: Blocks,
-    given: Iterable[tuple[str, str]] | None = None,
+    moving_fields: Iterable[tuple[str, str]] | None = None,
     form: str = "tangents",
 ) -> set[str]:
     """Raise AssertionError where a place does not fit its program, or a derivative would be lost or is not there.
@@ -578,7 +578,7 @@ def check(
     variables = (
         (name, field.name) for parts in VARIABLES.values() for name, _ in parts for field in _block(name, blocks)
     )
-    moving = set(variables if given is None else given)
+    moving = set(variables if moving_fields is None else moving_fields)
     every = ((call, programs[name]) for call in calls_of(passes) for name in call.programs)
     for call, program in every:
         assert program.output is not None

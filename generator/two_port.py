@@ -97,8 +97,8 @@ def _moves(use: Use) -> Use:
     """An input with what moves with the ends as active: of a program with a tangent what is active there."""
     if use.moving or use.block.name.endswith("_parameters"):
         return use
-    given = [name for name in MOVING.get(use.block.name, use.block.quantities) if name in use.block.quantities]
-    return replace(use, active=frozenset(fields_of(use.block, given)), moving=True)
+    names = [name for name in MOVING.get(use.block.name, use.block.quantities) if name in use.block.quantities]
+    return replace(use, active=frozenset(fields_of(use.block, names)), moving=True)
 
 
 def moving(blocks: Blocks) -> Iterator[tuple[str, str]]:
@@ -198,10 +198,10 @@ def eliminated(program: Program) -> Kernel:
         by_unknowns = [(column[name], unknown) for column, (unknown, *_) in zip(columns, equations, strict=True)]
         add(total, [(sp.Integer(sign), sign * value), *by_unknowns])
         results[name] = total
-    given = [
+    inputs = [
         replace(use, active=frozenset(), moving=False) if use.alias in ("g", "c") else use for use in program.inputs
     ]
-    found = Kernel(
-        replace(program, inputs=given, results=results), (), (*kernel.partials, *statements), tuple(tangents)
+    lowered = Kernel(
+        replace(program, inputs=inputs, results=results), (), (*kernel.partials, *statements), tuple(tangents)
     )
-    return replace(found, values=values_of_tangents(found))
+    return replace(lowered, values=values_of_tangents(lowered))

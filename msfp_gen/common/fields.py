@@ -204,7 +204,7 @@ def errors_at(prefix: str, path: str) -> Iterator[None]:
 def require_type(value: object, kind: type | tuple[type, ...], path: str) -> None:
     """Raise InputError unless `value` is an instance of `kind`."""
     if not isinstance(value, kind):
-        names = " or ".join(each.__name__ for each in (kind if isinstance(kind, tuple) else (kind,)))
+        names = " or ".join(option.__name__ for option in (kind if isinstance(kind, tuple) else (kind,)))
         raise InputError(f"{path} = {_one_line(value)}: give a {names}")
 
 

@@ -222,8 +222,8 @@ class Auto:
 
         Raises InputError if the values exclude each other.
         """
-        given = {field.name: getattr(self, field.name) for field in fields(Effects) if hasattr(self, field.name)}
-        return Effects(**{name: value for name, value in {**given, **choices}.items() if value is not None})
+        known = {field.name: getattr(self, field.name) for field in fields(Effects) if hasattr(self, field.name)}
+        return Effects(**{name: value for name, value in {**known, **choices}.items() if value is not None})
 
 
 SELECTABLE = ("dimension", "sliders", "rims", "uplift")
