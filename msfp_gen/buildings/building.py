@@ -141,9 +141,7 @@ class Building:
         modes[fixed.inner] = fixed.modes[:, kept]
         basis = np.hstack([self._static(fixed), modes])
         nodes = tuple(Node(node.name, node.position, node.rows @ basis, node.carries) for node in self.nodes)
-        columns = tuple(
-            Columns(storey.name, storey.deformation @ basis, storey.inertia @ basis) for storey in self.columns
-        )
+        columns = tuple(Columns(one.name, one.deformation @ basis, one.inertia @ basis) for one in self.columns)
         mass, damping, stiffness = (_congruent(matrix, basis) for matrix in (self.mass, self.damping, self.stiffness))
         return Building(mass, damping, stiffness, nodes, columns)
 

@@ -73,11 +73,8 @@ def standing_below(mount: BuildingBearing, load: float) -> tuple[float, float, f
 
     The building, which holds no plate at its place, follows it sideways.
     """
-    return (
-        mount.interface.rotational_stiffness,
-        needed_rotational_stiffness(mount.bearing, float(load), 0.0),
-        float(load),
-    )
+    weight = float(load)
+    return mount.interface.rotational_stiffness, needed_rotational_stiffness(mount.bearing, weight, 0.0), weight
 
 
 class VerticalModes(NamedTuple):

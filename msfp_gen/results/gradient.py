@@ -74,14 +74,12 @@ class Gradients:
         names = [name for name, values in by_parameter[0].items() if name not in constant and values is not None]
         if model.effects.uplift:
             is_open = model.unpack(run.rows[:count])["compression"] < 0
-            for arrays_of, slopes in zip(by_parameter, np.moveaxis(rows, 1, 0), strict=True):
-                arrays_of["lift"] = np.where(is_open, -model.unpack(slopes)["compression"], 0.0)
+            for values, slopes in zip(by_parameter, np.moveaxis(rows, 1, 0), strict=True):
+                values["lift"] = np.where(is_open, -model.unpack(slopes)["compression"], 0.0)
         vectors = (out_of_plane(events[:, :, 1 + 3 * i : 4 + 3 * i], azimuth, "vector") for i in range(2))
         displacement, force = (np.moveaxis(vector, 1, 0) for vector in vectors)
-        arrays = {name: np.array([arrays_of[name] for arrays_of in by_parameter]) for name in names}
-        arrays |= {
-            f"energy_{name}": np.array([arrays_of["energy"][name] for arrays_of in by_parameter]) for name in energies
-        }
+        arrays = {name: np.array([values[name] for values in by_parameter]) for name in names}
+        arrays |= {f"energy_{name}": np.array([values["energy"][name] for values in by_parameter]) for name in energies}
         arrays |= dict(zip(EVENTS, (events[:, :, 0].T, displacement, force), strict=True))
         return cls(
             parameters,

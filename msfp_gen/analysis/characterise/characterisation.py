@@ -205,12 +205,7 @@ class Characterisation:
         return Table("surfaces, bottom first: least capacity left, largest velocity, heat and uplift", columns, rows)
 
     def _cycle_table(self) -> Table:
-        columns = (
-            "cycle",
-            "least u [mm]",
-            "largest u [mm]",
-            *(quantity.heading for quantity in LOOP_QUANTITIES.values()),
-        )
+        columns = ("cycle", "least u [mm]", "largest u [mm]", *(kind.heading for kind in LOOP_QUANTITIES.values()))
         rows = []
         for cycle in self.cycles:
             ends = (cycle.loop.displacement_least, cycle.loop.displacement_most)
@@ -284,7 +279,7 @@ def _cycle_row(cycle: Cycle) -> Row:
         "displacement_least [m]": loop.displacement_least,
         "force_most [N]": loop.force_most,
         "force_least [N]": loop.force_least,
-        **{f"{name} [{quantity.unit}]": loop_quantity(cycle, name) for name, quantity in LOOP_QUANTITIES.items()},
+        **{f"{name} [{kind.unit}]": loop_quantity(cycle, name) for name, kind in LOOP_QUANTITIES.items()},
         "balance_energy [J]": cycle.balance_energy,
     }
     stages = cycle.stage_stiffness().items()

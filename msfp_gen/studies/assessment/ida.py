@@ -78,12 +78,10 @@ def ida(rows: Any, measure: str, demand: str, fractiles: Sequence[float] = FRACT
     sizes = curves.groupby("curve")[measure].nunique()
     if sizes.min() < 2:
         raise InputError(f"{measure}: an IDA needs several intensities of each record; curve {sizes.idxmin()} has one")
-    of_records = [
-        (c[measure].to_numpy(), c[demand].to_numpy(), c["ended"].to_numpy()) for _, c in curves.groupby("curve")
-    ]
-    levels = _levels(of_records)
-    values = np.sort([_interpolated(levels, *curve) for curve in of_records], axis=0)
-    table = {measure: levels, "curves": len(of_records), "ended_early": np.isinf(values).sum(axis=0)}
+    points = [(c[measure].to_numpy(), c[demand].to_numpy(), c["ended"].to_numpy()) for _, c in curves.groupby("curve")]
+    levels = _levels(points)
+    values = np.sort([_interpolated(levels, *curve) for curve in points], axis=0)
+    table = {measure: levels, "curves": len(points), "ended_early": np.isinf(values).sum(axis=0)}
     for share in fractiles:
         table[f"p{100 * share:g}"] = _fractile(values, share)
     return Ida(measure, demand, unit_of(rows, measure), unit_of(rows, demand), curves, pd.DataFrame(table))

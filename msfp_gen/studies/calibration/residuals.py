@@ -75,9 +75,7 @@ def unknowns_of(
     for path in map(_whole, paths):
         parts = path.split("=")
         members = [parameters_of(scene, [part], "parameters") for part in parts]
-        groups = (
-            [(parameter,) for parameter in members[0]] if len(parts) == 1 else [tuple(p for m in members for p in m)]
-        )
+        groups = [(p,) for p in members[0]] if len(parts) == 1 else [tuple(p for m in members for p in m)]
         limits = rest.pop(path, None)
         for group in groups:
             name = "=".join(parameter.path for parameter in group)
