@@ -19,10 +19,10 @@ from msfp_gen.studies.accuracy.study import (
     Say,
     Study,
     check_settings,
+    confirming_reruns,
     families,
     point_of,
     reference_notes,
-    rerun_to_end,
     run_tolerances,
     tighter_runs,
     trial_line,
@@ -136,7 +136,7 @@ def model_errors(
     full, _ = run_tolerances(METHODS["implicit"], scene, sorted(tolerances, reverse=True), limit, say)
     name, confirming = CONFIRMING
     others, _ = run_tolerances(METHODS[name], scene, confirming, limit, say)
-    extra = [*others, *tighter_runs(scene, full, limit, say), *rerun_to_end(scene, others, limit, say)]
+    extra = [*others, *tighter_runs(scene, full, limit, say), *confirming_reruns(scene, others, limit, say)]
     reference = best_reference([*full, *extra], families())
     points, notes = [point_of("as it stands", trial, reference) for trial in full], reference_notes(reference)
     for variant in VARIANTS:

@@ -99,7 +99,7 @@ def work_precision(
         runs, left_out = run_tolerances(method, scene, sorted(tolerances, reverse=True), limit, say)
         trials += runs
         notes += left_out
-    trials = with_reruns(trials, rerun_to_end(scene, trials, limit, say))
+    trials = with_reruns(trials, confirming_reruns(scene, trials, limit, say))
     reference = best_reference([*trials, *tighter_runs(scene, trials, limit, say)], families())
     points = tuple(point_of(trial.method, trial, reference) for trial in trials)
     return Study(scene, "work-precision", points, reference, (*notes, *reference_notes(reference)))
@@ -172,7 +172,7 @@ def tighter_runs(scene: Scene, trials: Sequence[Trial], limit: float, say: Say, 
     return tighter
 
 
-def rerun_to_end(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
+def confirming_reruns(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
     """Repeat runs that were cut off with a longer limit, as candidates for the reference.
 
     Of each method the tightest that can finish within that limit; of these the CONFIRMING_RUNS fastest.

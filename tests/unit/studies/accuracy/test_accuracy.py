@@ -14,7 +14,7 @@ from msfp_gen import Auto, Effects, InputError, Motion, RunError, Solver, Stop, 
 from msfp_gen.cli import main
 from msfp_gen.studies.accuracy import output, study, work_precision
 from msfp_gen.studies.accuracy.methods import METHODS, methods_named
-from msfp_gen.studies.accuracy.study import Point, Study, is_wrong, rerun_to_end, run_tolerances, without_stop
+from msfp_gen.studies.accuracy.study import Point, Study, confirming_reruns, is_wrong, run_tolerances, without_stop
 from msfp_gen.studies.accuracy.timed_run import (
     CUT_OFF,
     ERRORS,
@@ -148,10 +148,10 @@ def test_what_would_end_soon_is_taken_to_its_end():
     scene = short(duration=0.02)
     nearly = METHODS["DOP853"].attempt(scene, 1e-4, 10.0)
     stopped = replace(nearly, status=CUT_OFF, seconds=1.0, reached=0.01)
-    ended = rerun_to_end(scene, [stopped], 1.0, lambda line: None)
+    ended = confirming_reruns(scene, [stopped], 1.0, lambda line: None)
     assert [t.status for t in ended] == [OK]
     assert [t.status for t in study.with_reruns([stopped, trial()], ended)] == [OK, OK]
-    assert not rerun_to_end(scene, [replace(stopped, reached=1e-4)], 1.0, lambda line: None)
+    assert not confirming_reruns(scene, [replace(stopped, reached=1e-4)], 1.0, lambda line: None)
 
 
 @pytest.mark.parametrize("name", ["Radau", "BDF", "LSODA", "DOP853"])
