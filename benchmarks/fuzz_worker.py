@@ -25,7 +25,7 @@ from msfp_gen.scene.top import MassTop
 
 MEMORY = 4 << 30  # memory limit [bytes]; a run that needs more ends with a named failure
 ROWS = 8  # rows of a run that the second method repeats
-NAMES = ("newton", "step", "irregular", "uplift", "angle", "steps", "parted", "guard", "stiff", "law")
+NAMES = ("newton", "step", "irregular", "uplift", "angle", "steps", "separated", "monitor", "stiff", "law")
 
 
 def not_finite(result: Result) -> list[str]:

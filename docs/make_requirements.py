@@ -199,7 +199,7 @@ def words() -> Iterator[Requirement]:
     """Statuses, monitors, events and methods: tests that compare with, give or expect the word."""
     groups = (
         ("status", contract.STATUSES, "status"),
-        ("monitor", contract.MONITORS, "note|trip|monitor|guard"),
+        ("monitor", contract.MONITORS, "note|trip|monitor"),
         ("event", contract.EVENT_KINDS, "event|kind"),
         ("method", contract.METHODS, "method"),
     )

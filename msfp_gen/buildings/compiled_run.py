@@ -241,7 +241,7 @@ class BuildingRun:
         status, failed, surface, value = self.status
         if status == "ok" or not self.run.row_count:
             return False
-        own = range(len(self.members)) if status == "guard" else [failed - 1] if failed else []
+        own = range(len(self.members)) if status == "monitor" else [failed - 1] if failed else []
         changed = False
         for index in own:
             member = self.members[index]

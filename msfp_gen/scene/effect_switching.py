@@ -102,7 +102,7 @@ def next_effects(scene: Requested, ending: Ending) -> Effects | None:
         return _extended(scene, effects, "uplift")
     if status in JAM_STATUSES:
         return _extended(scene, effects, "inertia") or _extended(scene, effects, "uplift")
-    if status != "guard":
+    if status != "monitor":
         return None
     extended = effects
     for name in stopping_monitors(scene, effects, strict=False):  # several may have tripped in the same step

@@ -37,7 +37,7 @@ Progress = Callable[[float, float], None]  # called with the time reached and th
 
 def message_of(scene: Scene, segment: Segment) -> str:
     """Message about a segment that failed, in one line; after a monitor stopped the run, the texts of its notes."""
-    stopped = segment.status == "guard"
+    stopped = segment.status == "monitor"
     cause = "; ".join(note.text for note in monitor_notes(segment.ending, None)) if stopped else None
     return message(scene, segment.model, segment.run, segment.status, cause)
 

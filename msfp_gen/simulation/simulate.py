@@ -149,7 +149,7 @@ def simulate(
     resume
         Continue from the state in `checkpoint`; the rows are bit by bit those of an uninterrupted run.
     strict
-        Stop where a monitor trips (status `guard`), instead of continuing with a model that includes the effect
+        Stop where a monitor trips (status `monitor`), instead of continuing with a model that includes the effect
         (`Auto`) or with a note in the result (`Effects`): docs/effects.md.
     stream
         File (.nc) to which all rows are written, with the rest of the result, whether the run succeeds or not. They lie

@@ -284,9 +284,9 @@ STATUSES = (
     Status(
         "memory", "no memory for more rows", "no memory for more rows; give output_step, or stream the rows to disk"
     ),
-    Status("guard", "a monitor stopped the run (`strict`)", "what the model leaves out would matter from here on"),
+    Status("monitor", "a monitor stopped the run (`strict`)", "what the model leaves out would matter from here on"),
     Status(
-        "parted",
+        "separated",
         "a separated body lies farther from its place than the radius of its slider: the stack has come apart",
         "a body is beside its place by more than the radius of its slider: the stack has come apart; reduce the "
         "motion or raise the load",

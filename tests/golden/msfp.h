@@ -40,8 +40,8 @@ enum msfp_status {
     MSFP_E_STEPS, /* the permitted number of steps is used up */
     MSFP_E_FINITE, /* a value is not finite */
     MSFP_E_MEMORY, /* no memory for more rows */
-    MSFP_E_GUARD, /* a monitor stopped the run (`strict`) */
-    MSFP_E_PARTED, /* a separated body lies farther from its place than the radius of its slider: the stack has come apart */
+    MSFP_E_MONITOR, /* a monitor stopped the run (`strict`) */
+    MSFP_E_SEPARATED, /* a separated body lies farther from its place than the radius of its slider: the stack has come apart */
     MSFP_E_STIFF, /* the explicit method runs at its limit of stability, where its error estimate has no meaning */
     MSFP_E_LAW, /* the friction law gives a coefficient below zero */
     MSFP_STATUSES

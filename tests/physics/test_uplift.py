@@ -158,7 +158,7 @@ def test_a_stack_that_comes_apart_is_named():
     scene = Scene(presets.bearing("prototype-tfp"), still, top, UPLIFT, load=load)
     with pytest.raises(RunError, match=r"surface \d, aside \[m\] = 0\.\d+: .*come apart") as error:
         simulate(scene)
-    assert error.value.status == "parted" and error.value.result.history.lift.max() > 0.01
+    assert error.value.status == "separated" and error.value.result.history.lift.max() > 0.01
 
 
 @pytest.mark.parametrize("method", ["implicit", "esdirk4"])

@@ -266,7 +266,7 @@ static void one_step(msfp_building *b)
         h = msfp_step_to_event(h, share);
     }
     if ((b->bearing = tripped(b))) {
-        b->status = MSFP_E_GUARD;
+        b->status = MSFP_E_MONITOR;
         return;
     }
     accept(b, h, fabs(b->t + h - end) <= msfp_smallest_step(end) ? end : b->t + h, error);

@@ -40,7 +40,7 @@ int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
         if (face > 0.0 && aside > face) { /* further aside than its face is wide: it cannot land on it */
             run->status_surface = j + 1;
             run->status_value = aside;
-            return MSFP_E_PARTED;
+            return MSFP_E_SEPARATED;
         }
 #endif
         if (fabs(s->q[j][1]) > 1.5 || fabs(s->q[j][0]) > 1.5) {

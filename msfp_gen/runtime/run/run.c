@@ -163,7 +163,7 @@ static int try_step(msfp_run *run, double h, int prescribed, double *error)
 static int shorten_step(msfp_run *run, double h, double factor, int status)
 {
     /* The time at which a body leaves the stack is known well enough before steps are lost in roundoff. */
-    const double smallest = status == MSFP_E_PARTED ? MSFP_SHORTEST_TO_EVENT : MSFP_CLOSE;
+    const double smallest = status == MSFP_E_SEPARATED ? MSFP_SHORTEST_TO_EVENT : MSFP_CLOSE;
     run->h = h * factor;
     if (run->h >= smallest * fmax(1.0, run->now.t))
         return 0;
@@ -252,7 +252,7 @@ static int one_step(msfp_run *run)
     if (fabs(run->next.t - end) <= msfp_smallest_step(run->next.t)) /* end exactly there */
         run->next.t = end;
     if (msfp_monitor_step(run, after)) {
-        run->status = MSFP_E_GUARD;
+        run->status = MSFP_E_MONITOR;
         return 0;
     }
     return accept(run, before, after, relocations > 0, error, h);

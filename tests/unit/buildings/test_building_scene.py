@@ -68,7 +68,7 @@ def test_shapes_and_repetition():
     assert np.array_equal(result.wrench, again.wrench) and np.array_equal(result.displacement, again.displacement)
 
 
-@pytest.mark.parametrize(("effects", "status"), [(Effects(), "uplift"), (None, "parted")])
+@pytest.mark.parametrize(("effects", "status"), [(Effects(), "uplift"), (None, "separated")])
 def test_a_failed_run_names_the_bearing_and_keeps_its_rows(effects, status):
     """A support that moves away under one bearing alone: in tension, or with uplift until its parts fall off."""
     drop = Motion.from_acceleration([0.0, 0.05, 0.1, 5.0], np.outer([0.0, 0.0, -5.0, -5.0], [0.0, 0.0, 1.0]))

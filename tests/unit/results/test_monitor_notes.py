@@ -16,7 +16,7 @@ def test_a_switch_for_heat_is_no_answer_to_the_law() -> None:
     trips = {"law_load": (0.5, 1, 9e6), "law_speed": (0.6, 2, 2.1), "heat": (1.0, 3, 12.0), "uplift": (1.0, 1, 0.0)}
     before = Effects(dimension="planar", friction="pv", sliders="massless")
     after = replace(before, friction="pvt", uplift=True, sliders="inertial")
-    notes = monitor_notes(Ending(before, "guard", 1.0, 1, 0.0, trips), after)
+    notes = monitor_notes(Ending(before, "monitor", 1.0, 1, 0.0, trips), after)
     assert {note.kind: note.action for note in notes} == {
         "law_load": "",
         "law_speed": "",
@@ -41,7 +41,7 @@ def test_a_note_gives_the_largest_value_since_its_time() -> None:
     assert notes[0].text.startswith("from here on, friction may heat surface 3 by up to 65 K")
     assert notes[0].text.endswith("friction is then some 25% lower than here: give effects.friction = 'pvt'")
     assert notes[1].text.endswith("a force that is missing here: give effects.rims = true") and ";" not in notes[2].text
-    (stopped,) = monitor_notes(first._replace(status="guard", trips={"rims": (2.0, 2, 0.01)}), None)
+    (stopped,) = monitor_notes(first._replace(status="monitor", trips={"rims": (2.0, 2, 0.01)}), None)
     assert stopped.text.startswith("a slider is 0.01 m beyond the capacity of surface 2")
     switched = replace(notes[0], action="friction = pvt")
     assert joined_notes([switched], [notes[0]]) == [switched, notes[0]]

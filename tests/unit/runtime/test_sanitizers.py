@@ -98,7 +98,7 @@ def works(folder: Path, *flags: str) -> bool:
 def same_as_python(scene: Scene, output: str) -> None:
     """The program did the run that Python does, so the tools saw what users run."""
     row, steps, status = output.splitlines()
-    end = "parted" if scene.effects.uplift else "ok"  # shaken until a body is beside its place
+    end = "separated" if scene.effects.uplift else "ok"  # shaken until a body is beside its place
     if end == "ok":
         result = simulate(scene)
     else:
@@ -107,7 +107,7 @@ def same_as_python(scene: Scene, output: str) -> None:
         result = found
     assert status == result.status == end and result.summary["rims_met"]
     time, angle = float(row.split()[0]), float(row.split()[2])
-    if end == "parted":  # bouncing is chaotic: the last digits decide when
+    if end == "separated":  # bouncing is chaotic: the last digits decide when
         assert time == pytest.approx(result.history.time[-1], abs=0.02)
         return
     assert time == pytest.approx(scene.end) and abs(int(steps) - result.counters.steps) < 0.1 * int(steps) + 5

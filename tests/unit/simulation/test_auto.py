@@ -255,7 +255,7 @@ def test_rims_are_there_when_a_slider_comes_to_them() -> None:
     assert apart(ignored, full) > 0.05 and next(note.kind for note in ignored.notes) == "rims"
     with pytest.raises(RunError, match="beyond the capacity") as error:
         simulate(blind, strict=True)
-    assert error.value.status == "guard" and isinstance(error.value.result, Result)
+    assert error.value.status == "monitor" and isinstance(error.value.result, Result)
     assert error.value.result.history.time[-1] == pytest.approx(result.notes[0].time, abs=0.1)
     assert error.value.result.history.gap.min() > 0
 
@@ -433,7 +433,7 @@ def test_a_note_in_the_step_of_a_switch_does_not_end_the_run() -> None:
     """Heat without numbers can only be noted; inertia, in the same step, is answered."""
     scene = replace(TEST2, effects=Auto())
     trips = {"heat": (1.001, 2, 11.0), "inertia": (1.0, 1, 0.1)}
-    ending = Ending(scene.modelled, "guard", 1.0, 0, 0.0, trips)
+    ending = Ending(scene.modelled, "monitor", 1.0, 0, 0.0, trips)
     assert next_effects(scene, ending) == replace(scene.modelled, sliders="inertial")
 
 

@@ -171,7 +171,7 @@ def test_strict_stops_where_something_left_out_would_matter() -> None:
     (result,) = simulate_batch([flying()], strict=True)
     with pytest.raises(RunError) as caught:
         simulate(flying(), strict=True)
-    assert isinstance(caught.value.result, Result) and result.status == "guard"
+    assert isinstance(caught.value.result, Result) and result.status == "monitor"
     assert_same(result, caught.value.result)
 
 

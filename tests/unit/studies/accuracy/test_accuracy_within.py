@@ -295,7 +295,7 @@ def test_reference_runs_that_fail_end_the_search(monkeypatch):
 
     def failing(name, scene, rtol, limit, repeats):
         found = real(name, scene, rtol, limit, repeats)
-        return replace(found, status="parted", message="a body is beside") if name == "esdirk4" else found
+        return replace(found, status="separated", message="a body is beside") if name == "esdirk4" else found
 
     monkeypatch.setattr(error_target, "run_native", failing)
     with pytest.raises(RunError, match="was not reached: a run with every effect fails: a body is beside"):
