@@ -15,20 +15,21 @@ import sympy as sp
 from .blocks import Blocks
 from .gradients import differentiated
 from .lower import Kernel, Tangent, active_inputs, jacobian_column, lower, values_of_tangents
-from .program import Program, Statement, Use, fields_of
+from .program import Block, Program, Statement, Use, fields_of
 from .vectors import ZERO, add, cross, scale, subtract
 
 Symbols = dict[str, Any]
 WIDTH = "MSFP_PORT_FREEDOMS"
 """C constant with the number of columns: the freedoms of both ends."""
-MOVING: Mapping[str, tuple[str, ...]] = {
-    "foot_stage": ("y", "y1"),
-    "before": ("Y", "Z", "rise"),
-    "stage": ("Y", "Z", "rise"),
-    "far_end": ("u", "v"),
-    "body": ("t1", "t2", "t3", "w", "wp", "al", "alp", "C", "V", "A", "ac", "sp", "cp", "st", "ct"),
+FIXED: Mapping[str, tuple[str, ...]] = {
+    "foot_stage": ("beta", "mobility", "share"),
+    "before": ("beta", "gain"),
+    "stage": ("tau", "rest", "gain"),
+    "far_end": ("a", "rest", "axial"),
+    "body": ("vc", "rc"),
 }
-"""Block -> what moves with the ends, where that is not all of it; a step has a given length."""
+"""Block -> what the motion of the ends does not change, since a step has a given length, or what nothing here reads.
+All else of a block moves: a new field is differentiated unless it is named here."""
 CONTACT = ("M", "dY", "dZ", "mu", "N", "source")
 """Results of `contact` on which anything depends."""
 SUPPORT = frozenset({"psi", "theta", "psi1", "theta1"})
@@ -97,8 +98,12 @@ def _moves(use: Use) -> Use:
     """An input with what moves with the ends as active: of a program with a tangent what is active there."""
     if use.moving or use.block.name.endswith("_parameters"):
         return use
-    names = [name for name in MOVING.get(use.block.name, use.block.quantities) if name in use.block.quantities]
-    return replace(use, active=frozenset(fields_of(use.block, names)), moving=True)
+    return replace(use, active=frozenset(fields_of(use.block, _moving_of(use.block))), moving=True)
+
+
+def _moving_of(block: Block) -> list[str]:
+    """The quantities of a block that move with the ends."""
+    return [name for name in block.quantities if name not in FIXED.get(block.name, ())]
 
 
 def moving(blocks: Blocks) -> Iterator[tuple[str, str]]:
@@ -106,8 +111,7 @@ def moving(blocks: Blocks) -> Iterator[tuple[str, str]]:
     lists = {"x": blocks.coordinates, "frame": blocks.body, "load_moment": blocks.moment, "support": blocks.support}
     lists |= {"lock": blocks.lock, "far_end": blocks.far_end, "foot_stage": blocks.foot_stage, "before": blocks.before}
     for name, block in lists.items():
-        names = MOVING.get(name, tuple(block.quantities))
-        yield from ((name, field) for field in fields_of(block, (one for one in names if one in block.quantities)))
+        yield from ((name, field) for field in fields_of(block, _moving_of(block)))
 
 
 def by_ends(program: Program, at_hand: bool) -> Program:

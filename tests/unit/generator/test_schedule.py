@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from msfp_gen import Effects, Layout
+from msfp_gen.generator import gradients, two_port
 from msfp_gen.generator.derive import Equations, derive
 from msfp_gen.generator.schedule import (
     Call,
@@ -111,3 +112,13 @@ def test_every_list_is_written_before_it_is_read(
 def test_unknowns_are_as_many_as_balances(dimension: str, count: int) -> None:
     found = unknowns(equations_of(dimension=dimension).spec)
     assert len(found) == len(set(found)) == count
+
+
+def test_names_kept_by_hand_are_those_of_blocks():
+    """A field that was renamed would be left out of derivatives in silence."""
+    effects = Effects(spin="free", friction="pvt", uplift=True, top_rotation=True)
+    blocks = derive(ModelSpec(Layout.tfp(), effects)).blocks
+    for name, quantities in two_port.FIXED.items():
+        assert set(quantities) <= set(getattr(blocks, name).quantities), name
+    assert set(two_port.CONTACT) <= set(blocks.contact.quantities)
+    assert set(gradients.CONTACT) <= {field.name for field in blocks.contact.fields}
