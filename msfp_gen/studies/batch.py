@@ -110,6 +110,8 @@ def completed_runs(
     for label, scene in zip(labels, scenes, strict=True):
         with _located(label):
             check_method(scene)
+            if strict and (scene.fidelity == "backbone" or not isinstance(scene, Scene)):
+                raise InputError("strict: only runs of one bearing have it, not of the level 'backbone'; leave it out")
     return _completed(scenes, count, processes, strict, labels, progress)
 
 

@@ -106,16 +106,17 @@ def check_backbone(scene: AnyScene) -> None:
         if not isinstance(scene.top, MassTop):
             raise InputError(
                 f"top.kind = {scene.top.kind!r}: the model 'backbone' carries a mass; give top.kind = 'mass', or "
-                "accuracy.models = ['massless']"
+                "another model, such as 'massless'"
             )
         for name in ("initial_state", "load", "top_rotation"):
             if getattr(scene, name) is not None:
                 raise InputError(
-                    f"{name}: the model 'backbone' has none; leave it out, or give accuracy.models = ['massless']"
+                    f"{name}: the model 'backbone' has none; leave it out, or give another model, such as 'massless'"
                 )
     if np.any(scene.motion.coefficients[:, 3:]):
+        other = "massless" if isinstance(scene, Scene) else "rigid"
         raise InputError(
-            "motion: the base rotates, which the model 'backbone' does not see; give accuracy.models = ['massless']"
+            f"motion: the base rotates, which the model 'backbone' does not see; give another model, such as {other!r}"
         )
 
 

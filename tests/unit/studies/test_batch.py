@@ -36,7 +36,7 @@ from msfp_gen import (
     simulate,
     simulate_batch,
 )
-from msfp_gen.buildings.file import changed_scene
+from msfp_gen.buildings.file import changed_scene, reduced
 from msfp_gen.cli import main
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.model import model as models
@@ -165,6 +165,12 @@ def test_every_number_is_that_of_simulate_in_processes() -> None:
     for scene, result in zip(scenes, results, strict=True):
         assert result.scene is scene
         assert_same(result, alone(scene))
+
+
+def test_strict_is_refused_where_runs_have_no_such_option() -> None:
+    for scene in (load_scene("hospital-clc"), reduced(plain_scene("ridgecrest-clc"), "backbone")):
+        with pytest.raises(InputError, match="strict: only runs of one bearing"):
+            simulate_batch([usual()[0], scene], strict=True)
 
 
 def test_strict_stops_where_something_left_out_would_matter() -> None:
