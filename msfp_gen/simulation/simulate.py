@@ -281,17 +281,17 @@ class RunSequence:
             raise switching_error(segment, notes)
         self.effects = following
 
-    def result(self) -> Result:
-        """The result of all segments. A segment that failed at once has no row; of a run that did, the initial state.
+    def result(self, with_initial_row: bool = False) -> Result:
+        """The result of all segments; raises RunError where none has a row. A segment that failed at once has none.
 
-        Raises RunError where that state is not finite, or would have derivatives.
+        with_initial_row: record the initial state of a run that failed before its first row, if that state is finite.
         """
         last = self.segments[-1]
         if self.stream is not None:
             rows_on_disk = StreamedRows(self.segments, self.scene)
             if rows_on_disk.count:
                 return rows_on_disk.written(partial(_result, self), self.stream)
-        if not self.parameters and not any(segment.run.row_count for segment in self.segments):
+        if with_initial_row and not any(segment.run.row_count for segment in self.segments):
             last.run.record_now()
         parts = [(s, rows) for s in self.segments if len(rows := finite_rows(s.run.rows))]
         if not parts:
@@ -299,6 +299,17 @@ class RunSequence:
         sprung, before = is_sprung(self.scene.top), start_temperatures(self.segments, self.scene)
         histories = [history_of(segment.model, rows, segment.azimuth, sprung) for segment, rows in parts]
         return _result(self, joined(histories, self.scene.output_step, before))
+
+
+def state_at_start(scene: Scene, strict: bool = False) -> Result:
+    """The result of a run that fails before its first row: its initial state, so that a table has a row of it.
+
+    Raises RunError where that state is not finite.
+    """
+    sequence = RunSequence.of(scene, strict)
+    while sequence.effects is not None:
+        sequence.run_segment(None)
+    return sequence.result(with_initial_row=True)
 
 
 def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, StartSlopes | None]:

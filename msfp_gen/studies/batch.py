@@ -16,7 +16,7 @@ from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.memory import require_memory
-from msfp_gen.simulation.simulate import simulate
+from msfp_gen.simulation.simulate import simulate, state_at_start
 from msfp_gen.studies.estimation.backbone_run import check_backbone, run_backbone
 from msfp_gen.studies.pool import SharedProgress, local_pool, raise_if_stopped, worker_count
 
@@ -177,9 +177,11 @@ def run_to_end(
     except RunError as error:
         if expired:
             raise RunError(f"ended after {seconds:g} s of wall time", status=OUT_OF_TIME, result=error.result) from None
-        if error.result is None:
+        if error.result is not None:
+            return error.result
+        if not isinstance(scene, Scene):
             raise
-        return error.result
+    return state_at_start(scene, options.get("strict", False))
 
 
 @contextmanager

@@ -286,10 +286,8 @@ def test_a_run_that_fails_at_its_start_has_the_state_there(monkeypatch: pytest.M
     with pytest.raises(RunError) as caught:
         simulate(stuck)
     ended, failed = simulate_batch([load_scene("fenz-test1"), stuck])
-    alone = caught.value.result
-    assert ended.succeeded and isinstance(alone, Result)
-    assert failed.status == caught.value.status and failed.message == str(caught.value)
-    np.testing.assert_array_equal(failed.history.top_force, alone.history.top_force)
+    assert ended.succeeded and caught.value.result is None
+    assert failed.status == caught.value.status and failed.message.startswith(str(caught.value))
     assert failed.status in ("irregular", "newton") and failed.history.time.tolist() == [0.0]
     # As of a state that is not finite.
     monkeypatch.setattr("msfp_gen.simulation.simulate.finite_rows", lambda rows: rows[: len(rows) - 1])
