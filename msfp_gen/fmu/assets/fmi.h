@@ -10,6 +10,7 @@
 #ifdef __GNUC__ /* functions of the standard have arguments that this unit does not need */
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
+/* NOLINTBEGIN(misc-unused-parameters,bugprone-macro-parentheses): the same; a list of parameters has its own. */
 
 enum {
     BEFORE = FMU_AT(FMU_INSTANTIATED),
@@ -99,3 +100,4 @@ FUNCTION(SetContinuousStates, RUNNING | EVENTS, (fmi_instance instance, const fm
 LIST(GetEventIndicators, f->values + FMU_GAPS, FMU_INDICATORS)
 LIST(GetContinuousStates, f->values + FMU_CONTINUOUS, FMU_STATES)
 LIST(GetNominalsOfContinuousStates, fmu_state_nominals, FMU_STATES)
+/* NOLINTEND(misc-unused-parameters,bugprone-macro-parentheses) */

@@ -13,6 +13,7 @@
 typedef fmi2Component fmi_instance;
 typedef fmi2Real fmi_real;
 #include "fmi.h"
+/* NOLINTBEGIN(misc-unused-parameters,bugprone-macro-parentheses): as in fmi.h */
 
 static void send(const fmu *f, fmu_status status, const char *category, const char *text)
 {
@@ -90,3 +91,4 @@ FUNCTION(GetIntegerStatus, ANY, (fmi2Component instance, const fmi2StatusKind ki
 
 FUNCTION(NewDiscreteStates, EVENTS, (fmi2Component instance, fmi2EventInfo *info), (memset(info, 0, sizeof *info), FMU_OK))
 LIST(GetDerivatives, f->values + FMU_DERIVATIVES, FMU_STATES)
+/* NOLINTEND(misc-unused-parameters,bugprone-macro-parentheses) */

@@ -5,6 +5,7 @@
 typedef fmi3Instance fmi_instance;
 typedef fmi3Float64 fmi_real;
 #include "fmi.h"
+/* NOLINTBEGIN(misc-unused-parameters,bugprone-macro-parentheses): as in fmi.h */
 
 static void send(const fmu *f, fmu_status status, const char *category, const char *text)
 {
@@ -154,3 +155,4 @@ FUNCTION(GetNumberOfEventIndicators, ANY, (fmi3Instance instance, size_t *count)
          (*count = f->exchange ? FMU_INDICATORS : 0, FMU_OK))
 FUNCTION(GetNumberOfContinuousStates, ANY, (fmi3Instance instance, size_t *count),
          (*count = f->exchange ? FMU_STATES : 0, FMU_OK))
+/* NOLINTEND(misc-unused-parameters,bugprone-macro-parentheses) */
