@@ -179,7 +179,7 @@ def run_to_end(
             raise RunError(f"ended after {seconds:g} s of wall time", status=OUT_OF_TIME, result=error.result) from None
         if error.result is not None:
             return error.result
-        if not isinstance(scene, Scene):
+        if not isinstance(scene, Scene) or error.status == "interrupted":
             raise
     return state_at_start(scene, options.get("strict", False))
 
