@@ -1,24 +1,10 @@
 /* fmu.c: variables, steps and directional derivatives of a unit. */
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fmu.h"
 
 static const double time_tolerance = 1e-9; /* relative to max(1, t): a sum of communication steps is that of the unit */
-
-fmu_status fmu_fail(const fmu *f, fmu_status status, const char *format, ...)
-{
-    char text[FMU_TEXT];
-    va_list arguments;
-    va_start(arguments, format);
-    (void)vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    if (f->log)
-        f->log(f, status, status == FMU_DISCARD ? "logStatusDiscard" : "logStatusError", text);
-    return status;
-}
 
 fmu *fmu_new(const char *name, const char *token, int exchange, fmu_logger log, void (*callback)(void),
              void *environment)
@@ -316,8 +302,12 @@ static fmu_status differentiate(fmu *f, int order)
 fmu_status fmu_derivative(fmu *f, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,
                           size_t known_count, const double *seed, double *sensitivity)
 {
-    if (f->exchange)
-        return fmu_exchange_derivative(f, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
+    if (f->exchange) {
+        const fmu_status status = fmu_ready(f);
+        return status == FMU_OK
+                   ? fmu_exchange_derivative(f, unknowns, unknown_count, knowns, known_count, seed, sensitivity)
+                   : status;
+    }
     for (size_t i = 0; i < unknown_count; ++i)
         if (unknowns[i] < FMU_OUTPUTS || unknowns[i] >= FMU_OUTPUTS + FMU_OUTPUT_COUNT)
             return fmu_fail(f, FMU_ERROR, "directional derivative: unknown %u is no output", unknowns[i]);

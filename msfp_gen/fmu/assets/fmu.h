@@ -59,7 +59,6 @@ fmu *fmu_new(const char *name, const char *token, int exchange, fmu_logger log, 
 void fmu_free(fmu *f);
 /* Whether a call may be made in this phase; phases: bits FMU_AT. */
 int fmu_allowed(fmu *f, const char *call, unsigned phases);
-fmu_status fmu_fail(const fmu *f, fmu_status status, const char *format, ...);
 fmu_status fmu_reset(fmu *f);
 fmu_status fmu_go(fmu *f, fmu_phase phase);
 /* Length of the run: start [s], and the relative tolerance where it is defined (else 0). */
@@ -102,6 +101,8 @@ void fmu_release(fmu *f);
 void fmu_outputs(const fmu *f, const double *row, const double *wrench, const double *ends, double *outputs);
 /* Their derivatives by a freedom of the ends, from those that port_row_derivative gives. */
 void fmu_output_derivatives(const double *row, const double *wrench, double *outputs);
+/* Send a message, and return its status; of a call of msfp.h, what it found. */
+fmu_status fmu_fail(const fmu *f, fmu_status status, const char *format, ...);
 fmu_status fmu_failure(const fmu *f, fmu_status status, const char *what, int found, const char *message);
 #if FMU_MASS
 /* Base motion [order][u_1..3, psi, theta, phi] of the lower end of `ends`. */
@@ -110,11 +111,10 @@ void fmu_base(const double *ends, double base[FMU_ORDERS][6]);
 
 /* ---- fmu_exchange.c: Model Exchange ---- */
 
-/* States at rest. */
-void fmu_exchange_start(fmu *f);
 /* Derivatives, outputs and event indicators at the present states and inputs. */
 fmu_status fmu_exchange_evaluate(fmu *f);
-fmu_status fmu_exchange_derivative(fmu *f, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,
-                                   size_t known_count, const double *seed, double *sensitivity);
+/* As fmu_derivative, of a unit that is ready. */
+fmu_status fmu_exchange_derivative(const fmu *f, const unsigned *unknowns, size_t unknown_count,
+                                   const unsigned *knowns, size_t known_count, const double *seed, double *sensitivity);
 
 #endif

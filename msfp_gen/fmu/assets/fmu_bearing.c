@@ -1,5 +1,7 @@
 /* fmu_bearing.c: bearing and two-port of the parameters of a unit, its outputs, and what a failure says. */
 #include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fmu.h"
@@ -16,6 +18,18 @@ void fmu_release(fmu *f)
     f->before = NULL;
     f->size = 0;
     f->stepped = f->ready = f->known = 0;
+}
+
+fmu_status fmu_fail(const fmu *f, fmu_status status, const char *format, ...)
+{
+    char text[FMU_TEXT];
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (f->log)
+        f->log(f, status, status == FMU_DISCARD ? "logStatusDiscard" : "logStatusError", text);
+    return status;
 }
 
 fmu_status fmu_failure(const fmu *f, fmu_status status, const char *what, int found, const char *message)
@@ -64,6 +78,19 @@ static void top_of(const double *values, double top[FMU_TOP_SIZE])
         top[places[i]] = values[FMU_TOP_VALUES + i];
 }
 
+#if FMU_EXCHANGE
+/* The states that an importer integrates, as they are in the two-port at the start. */
+static void states_at_start(fmu *f)
+{
+    double row[FMU_ROW_SIZE], *states = f->values + FMU_CONTINUOUS;
+    FMU_MODEL()->port_row(f->port, row);
+    memcpy(states, row + FMU_ROW_Q, NB * NQ * sizeof *row);
+    memcpy(states + NB * NQ, row + FMU_ROW_V, NB * NQ * sizeof *row);
+    memcpy(states + 2 * NB * NQ, row + FMU_ROW_F, 2 * NB * sizeof *row);
+    f->known = 0;
+}
+#endif
+
 fmu_status fmu_build(fmu *f)
 {
     const msfp_api *api = FMU_MODEL();
@@ -110,8 +137,10 @@ fmu_status fmu_build(fmu *f)
     memcpy(f->plate, f->values + FMU_OUTPUTS, sizeof f->plate);
     fmu_outputs(f, row, wrench, ends, f->values + FMU_OUTPUTS);
 #endif
+#if FMU_EXCHANGE
     if (f->exchange)
-        fmu_exchange_start(f);
+        states_at_start(f);
+#endif
     f->ready = 1;
     return FMU_OK;
 }

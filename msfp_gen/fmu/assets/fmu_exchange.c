@@ -12,16 +12,6 @@
 enum { NB = FMU_SURFACES, MOTIONS = FMU_SURFACES * FMU_COORDINATES };
 typedef char states_are_q_v_Y_Z[FMU_STATES == 2 * MOTIONS + 2 * NB ? 1 : -1];
 
-void fmu_exchange_start(fmu *f)
-{
-    double row[FMU_ROW_SIZE], *states = f->values + FMU_CONTINUOUS;
-    FMU_MODEL()->port_row(f->port, row);
-    memcpy(states, row + FMU_ROW_Q, MOTIONS * sizeof *row);
-    memcpy(states + MOTIONS, row + FMU_ROW_V, MOTIONS * sizeof *row);
-    memcpy(states + 2 * MOTIONS, row + FMU_ROW_F, 2 * NB * sizeof *row);
-    f->known = 0;
-}
-
 /* Rates of the states, outputs and gaps at these states and inputs. */
 static int evaluate(const fmu *f, const double *states, const double *inputs, double *derivatives, double *outputs,
                     double *gaps)
@@ -57,14 +47,11 @@ static double natural_size(unsigned known)
     return known < FMU_OUTPUTS ? fmu_nominals[known - FMU_INPUTS] : fmu_state_nominals[known - FMU_CONTINUOUS];
 }
 
-fmu_status fmu_exchange_derivative(fmu *f, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,
-                                   size_t known_count, const double *seed, double *sensitivity)
+fmu_status fmu_exchange_derivative(const fmu *f, const unsigned *unknowns, size_t unknown_count,
+                                   const unsigned *knowns, size_t known_count, const double *seed, double *sensitivity)
 {
     static const double share = 1e-5;
     double largest = 0.0, found[2][FMU_STATES + FMU_OUTPUT_COUNT];
-    const fmu_status ready = fmu_ready(f);
-    if (ready != FMU_OK)
-        return ready;
     for (size_t i = 0; i < unknown_count; ++i)
         if (!((unknowns[i] >= FMU_OUTPUTS && unknowns[i] < FMU_OUTPUTS + FMU_OUTPUT_COUNT)
               || (unknowns[i] >= FMU_DERIVATIVES && unknowns[i] < FMU_DERIVATIVES + FMU_STATES)))
@@ -97,14 +84,17 @@ fmu_status fmu_exchange_derivative(fmu *f, const unsigned *unknowns, size_t unkn
 }
 
 #else
-void fmu_exchange_start(fmu *f) { (void)f; }
+static fmu_status refuse(const fmu *f)
+{
+    return fmu_fail(f, FMU_ERROR, "Model Exchange: this unit is for Co-Simulation");
+}
 
-fmu_status fmu_exchange_evaluate(fmu *f) { return fmu_fail(f, FMU_ERROR, "Model Exchange: this unit is for Co-Simulation"); }
+fmu_status fmu_exchange_evaluate(fmu *f) { return refuse(f); }
 
-fmu_status fmu_exchange_derivative(fmu *f, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns,
-                                   size_t known_count, const double *seed, double *sensitivity)
+fmu_status fmu_exchange_derivative(const fmu *f, const unsigned *unknowns, size_t unknown_count,
+                                   const unsigned *knowns, size_t known_count, const double *seed, double *sensitivity)
 {
     (void)unknowns, (void)unknown_count, (void)knowns, (void)known_count, (void)seed, (void)sensitivity;
-    return fmu_exchange_evaluate(f);
+    return refuse(f);
 }
 #endif
