@@ -374,7 +374,8 @@ typedef struct msfp_api {
     void (*snapshot_write)(const msfp_run *run, long rows, void *snapshot);
     /* Go to a snapshot of a run of the same scene and build: what follows is bit by bit what followed there. A snapshot of a
      * scene with any other number, as it was given to run_new, is MSFP_E_SNAPSHOT; coefficients that were changed later
-     * are not compared. The run is unchanged after MSFP_E_SNAPSHOT and MSFP_E_MEMORY. */
+     * are not compared. The run is unchanged after MSFP_E_SNAPSHOT and MSFP_E_MEMORY, and after MSFP_E_ARGUMENT, which is
+     * the answer once its derivatives have begun. */
     int (*snapshot_read)(msfp_run *run, const void *snapshot, size_t size);
     /* A run of no scene in the state of a snapshot, to read its state from; it takes no steps. */
     int (*snapshot_open)(const void *snapshot, size_t size, msfp_run **run);

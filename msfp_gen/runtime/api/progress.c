@@ -85,6 +85,10 @@ int msfp_api_snapshot_read(msfp_run *run, const void *snapshot, size_t size)
 {
     if (!run)
         return MSFP_E_ARGUMENT;
+#if MSFP_GRADIENTS
+    if (run->gradients) /* a snapshot holds none */
+        return MSFP_E_ARGUMENT;
+#endif
     return snapshot ? status_of_snapshot(msfp_snapshot_read(run, snapshot, size)) : MSFP_E_SNAPSHOT;
 }
 

@@ -26,8 +26,12 @@ from msfp_gen import (
     simulate,
     simulate_batch,
 )
+from msfp_gen.model.model import build_model
 from msfp_gen.results.extremes import Extremes
+from msfp_gen.scene.parameters import parameters_of
+from msfp_gen.simulation.gradient_inputs import start_gradients
 from msfp_gen.simulation.gradients import measured_errors, with_gradient_errors
+from msfp_gen.simulation.simulate import RunSequence
 
 PATHS = ("bearing.surfaces[*].friction", "top.axial_load", "motion.scale")
 
@@ -52,6 +56,23 @@ def test_a_run_with_gradients_is_the_same_run() -> None:
     for name in plain.dataset.data_vars:
         assert np.array_equal(plain.dataset[name].values, result().dataset[name].values), name
     assert plain.summary["counters"] == result().summary["counters"]
+
+
+def test_a_run_with_gradients_goes_to_no_snapshot() -> None:
+    """A snapshot holds no derivatives; the run goes on as if it had been given none."""
+    scene = triple(0.2)
+    model = build_model(scene.bearing.layout, scene.modelled, gradients=True)
+    run, _ = RunSequence.of(scene).start_segment(model)
+    parameters = parameters_of(scene, PATHS)
+    snapshot = run.snapshot()
+    run.restore(snapshot)
+    start_gradients(run, scene, model, parameters)
+    with pytest.raises(ValueError, match="snapshot"):
+        run.restore(snapshot)
+    while run.advance():
+        pass
+    assert run.status[0] == "ok"
+    assert run.gradient_rows(len(parameters)).shape[:2] == (3, len(parameters))
 
 
 def test_the_dataset_has_the_variables_that_vary_by_parameter() -> None:
