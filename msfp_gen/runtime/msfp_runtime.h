@@ -411,6 +411,7 @@ struct msfp_run {
     void *user;                 /* its first argument */
 #if MSFP_GRADIENTS
     struct msfp_gradients *gradients; /* NULL: none are computed */
+    const struct msfp_hooks *hooks;   /* theirs; NULL likewise */
 #endif
 };
 #define MSFP_SNAPSHOT_BEGIN offsetof(msfp_run, next_jump)

@@ -242,6 +242,34 @@ def test_runtime_includes_one_way(path):
     assert included and included <= below | generated
 
 
+FOLDERS_OF_C = ("runtime", "fmu/assets", "buildings/compiled", "studies/estimation/compiled")
+FUNCTION = re.compile(r"^(?!.*\bstatic\b|MSFP_INLINE|typedef)\w[\w *]*?\b(\w+)\([^;{}]*\)\s*\{", flags=re.MULTILINE)
+
+
+def calls_between(paths):
+    """C file -> the others of which it names a function."""
+    texts = {p: re.sub(r"/\*.*?\*/", "", p.read_text(encoding="utf-8"), flags=re.DOTALL) for p in paths}
+    defined = {path: set(FUNCTION.findall(text)) for path, text in texts.items()}
+    words = {path: set(re.findall(r"(?<![.>\w])\w+", text)) for path, text in texts.items()}  # no fields
+    return {path: {q for q in paths if words[path] & defined[q] - defined[path]} for path in paths}, defined
+
+
+@pytest.mark.parametrize("folder", FOLDERS_OF_C)
+def test_no_files_of_c_call_each_other_in_a_circle(folder):
+    """Of the folders of the runtime each calls what stands before it, `gradients` only what stands before `port`."""
+    left, defined = calls_between([*(ROOT / "msfp_gen" / folder).rglob("*.c")])
+    assert all(defined.values())
+    order = ("equations", "steppers", "run", GRADIENTS[0], "port", "api")
+    for path, others in left.items() if folder == "runtime" else ():
+        place = order.index(path.parent.name)
+        back = [other.name for other in others if order.index(other.parent.name) > place]
+        assert not back, f"{path.name} calls {back}"
+    while left:
+        free = {path for path, needs in left.items() if not needs & set(left)}
+        assert free, f"a circle of calls among {sorted(path.name for path in left)}"
+        left = {path: needs for path, needs in left.items() if path not in free}
+
+
 def test_names_of_runtime_files_are_unique():
     """Generated sources lie in one folder."""
     assert len({path.name for path in SOURCES}) == len(SOURCES)

@@ -42,16 +42,6 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
     return MSFP_OK;
 }
 
-MSFP_WIDE void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
-{
-    msfp_blocks s;
-    msfp_block_tangents ds;
-    msfp_set_loads(p, at, &s);
-    memset(ds.load_force, 0, sizeof ds.load_force);
-    memset(ds.load_moment, 0, sizeof ds.load_moment);
-    msfp_top_tangents(p, w, &s, &ds);
-}
-
 void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale)
 {
     for (int k = 0; k < NB; ++k) {

@@ -128,7 +128,7 @@ void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *s
 /* Largest residual relative to its natural size, infinite where one is not finite. worst: its row, unchanged if all are
  * zero. */
 double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const double *residual, int *worst);
-/* Columns of force and moment at the top at a given load, from those of the top plate: all in `w`. */
+/* Of tangent.c in all models: columns of force and moment at the top at a given load, from those of the top plate: all in `w`. */
 void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 /* Tangent [MSFP_DOF][MSFP_DOF] of the condensed equations at the evaluation in `w`. */
 void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,

@@ -1,5 +1,5 @@
-/* tangent.c: the fast tangent of the condensed equations, without uplift: an unknown moves its body and all bodies above
- * it as one rigid body.
+/* tangent.c: the tangent at the top, and, without uplift, the fast tangent of the condensed equations: an unknown moves
+ * its body and all bodies above it as one rigid body.
  *
  * Columns are formed from the top down in body-fixed frames (generator/columns.py). A body above an unknown sees only
  * the variation of its angular velocity and acceleration, a body below only the variation of the interface force.
@@ -10,6 +10,17 @@
 #include <string.h>
 #include "equations.h"
 #include "msfp_kernels.h"
+#include "msfp_schedule.h"
+
+MSFP_WIDE void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+{
+    msfp_blocks s;
+    msfp_block_tangents ds;
+    msfp_set_loads(p, at, &s);
+    memset(ds.load_force, 0, sizeof ds.load_force);
+    memset(ds.load_moment, 0, sizeof ds.load_moment);
+    msfp_top_tangents(p, w, &s, &ds);
+}
 
 #if !MSFP_FORWARD_TANGENT
 enum { LANES = MSFP_LANES };
@@ -88,8 +99,8 @@ MSFP_INLINE void twists(const msfp_work *w, const double *seed, double *twist)
 }
 
 /* Columns of force and moment at the top, whose springs act along fixed axes. */
-MSFP_INLINE void top(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                     const double *variation, columns *c)
+MSFP_INLINE void top_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                             const double *variation, columns *c)
 {
     double body[MSFP_BODY_SIZE], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
     msfp_transported_twist_tangent(w->body[NB], no_twist, body, c->twist, w->dbody[NB]);
@@ -164,7 +175,7 @@ MSFP_INLINE void contact_row(const double *restrict slope, const double *restric
 }
 
 /* Columns of the moment of surface j, in the basis of the body below, of N and in models with gradients of the rates. */
-MSFP_INLINE void surface(msfp_work *w, const msfp_seed *seed, int j, const double *parts, columns *c)
+MSFP_INLINE void surface_tangent(msfp_work *w, const msfp_seed *seed, int j, const double *parts, columns *c)
 {
     double unused[FORCE], local[FORCE * DOF];
     const double *rim = w->jacobians.rim[j], factors[2] = { seed->q_weight, seed->v_weight };
@@ -220,7 +231,7 @@ MSFP_INLINE void descend(const msfp_parameters *p, const msfp_seed *seed, msfp_w
         force_below(p, w, k, variation[k], c);
         memcpy(next, c->below, sizeof next);
         add_variation(next, k, variation[k], VARIATION_F, FORCE);
-        surface(w, seed, k - 1, parts, c);
+        surface_tangent(w, seed, k - 1, parts, c);
         balance(p, w, k, variation[k], c, tangent);
         memcpy(c->above, next, sizeof c->above);
         memcpy(c->moment_above, c->moment_below, sizeof c->moment_above);
@@ -254,7 +265,7 @@ MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, cons
         msfp_local_variation(factors, w->body[k - 1], w->body[k], w->x[k], w->x[k - 1], w->force[k - 1], moment,
                              variation[k]);
     }
-    top(p, at, seed, w, variation[NB], &c);
+    top_tangent(p, at, seed, w, variation[NB], &c);
     descend(p, seed, w, variation, &c, tangent);
 }
 #endif

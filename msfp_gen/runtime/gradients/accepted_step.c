@@ -62,47 +62,6 @@ static int ends_at_fixed_time(const msfp_run *run)
            (run->next_jump < run->jump_count && t == run->jumps[run->next_jump]);
 }
 
-/* What decides an event of surface j at the end of the step (msfp_event_columns), and its rate [m/s]. */
-static double event_at_end(msfp_run *run, int kind, int j, double *rate)
-{
-    static const msfp_parameter_columns constant;
-    msfp_columns rates;
-    msfp_point at;
-    msfp_point_columns dat; /* column 0: derivatives with respect to time */
-    memset(&dat, 0, sizeof dat);
-    msfp_to_point(run, &run->next, &at);
-    dat.base_moves = 1;
-    for (int i = 0; i < 6; ++i) {
-        dat.base[0][i][0] = at.base[1][i];
-        dat.base[1][i][0] = at.base[2][i];
-    }
-    for (int k = 0; k < NB; ++k)
-        for (int i = 0; i < NQ; ++i) {
-            dat.q[k][i][0] = at.v[k][i];
-            dat.v[k][i][0] = at.a[k][i];
-        }
-    const double value = msfp_event_columns(&run->parameters, &constant, &at, &dat, kind, j, rates);
-    *rate = rates[0];
-    return value;
-}
-
-void msfp_event_time_columns(msfp_run *run, msfp_parameter_batch *batch, int kind, int j, double *dt)
-{
-    msfp_columns value;
-    msfp_point at;
-    msfp_point_columns dat;
-    double rate;
-    memset(&dat, 0, sizeof dat);
-    msfp_to_point(run, &run->next, &at);
-    msfp_inputs_columns(run, batch, run->next.t, batch->next.t, &dat);
-    memcpy(dat.q, batch->next.q, sizeof dat.q);
-    memcpy(dat.v, batch->next.v, sizeof dat.v);
-    msfp_event_columns(&run->parameters, &batch->parameters, &at, &dat, kind, j, value);
-    event_at_end(run, kind, j, &rate);
-    for (int c = 0; c < C; ++c)
-        dt[c] = rate != 0.0 ? -value[c] / rate : 0.0;
-}
-
 /* Columns of the state at the end of the step, whose length has the columns batch->h. */
 static void step_columns(msfp_run *run, msfp_parameter_batch *batch)
 {
@@ -151,7 +110,7 @@ static int take_step_to_event(msfp_run *run, int j, int meets)
         const int status = msfp_step_implicit(run, h, &error);
         if (status)
             return status;
-        gap = event_at_end(run, MSFP_EVENT_RIM_CONTACT, j, &rate);
+        gap = msfp_event_at_end(run, MSFP_EVENT_RIM_CONTACT, j, &rate);
         if (meets ? rate >= 0.0 : rate <= 0.0)
             return MSFP_E_STEP;
         h = fmax(0.5 * h, h - gap / rate);
@@ -182,11 +141,9 @@ static int columns_to_event(msfp_run *run, int rim, int fixed, int meets)
     return status;
 }
 
-int msfp_gradients_step(msfp_run *run, const double *before, const double *after)
+int msfp_accepted_step_columns(msfp_run *run, const double *before, const double *after)
 {
     struct msfp_gradients *g = run->gradients;
-    if (!g)
-        return MSFP_OK;
     ++g->step;
     if (g->count == 0)
         return MSFP_OK;

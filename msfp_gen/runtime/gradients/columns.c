@@ -32,8 +32,8 @@ MSFP_INLINE void put_separation(double *block, const msfp_columns *q, const msfp
 
 static const double constant[MSFP_BODY_PARAMETERS_SIZE * C]; /* columns of a body that no parameter changes */
 
-MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
-                            msfp_blocks *s, msfp_block_directions *ds, msfp_work_columns *d)
+MSFP_INLINE void motion_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                                msfp_blocks *s, msfp_block_directions *ds, msfp_work_columns *d)
 {
     const msfp_point_columns *dat = ds->point;
     put_coordinates(d->x[0], dat->base[0] + 3, dat->base[1] + 3, dat->base[2] + 3);
@@ -63,7 +63,7 @@ void msfp_motion_columns(const msfp_parameters *p, const msfp_parameter_columns 
     msfp_block_directions ds;
     s.at = at;
     ds.point = dat;
-    kinematics(p, dp, w, &s, &ds, d);
+    motion_columns(p, dp, w, &s, &ds, d);
 }
 #endif
 
@@ -79,8 +79,8 @@ void msfp_support_columns(const msfp_point *at, const msfp_point_columns *dat, d
 #endif
 
 /* Columns of the block `foot_stage`, as msfp_foot_stage fills it. */
-MSFP_INLINE void foot_stage(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                            const msfp_point_columns *dat, double *d)
+MSFP_INLINE void foot_stage_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                                    const msfp_point_columns *dat, double *d)
 {
     const double before[MSFP_FOOT_BEFORE_SIZE] = { at->foot[0], at->foot[1], at->foot_beta };
     double dbefore[MSFP_FOOT_BEFORE_SIZE * C];
@@ -92,12 +92,12 @@ MSFP_INLINE void foot_stage(const msfp_parameters *p, const msfp_parameter_colum
         memset(d, 0, MSFP_FOOT_STAGE_SIZE * C * sizeof *d);
 }
 
-MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w, msfp_blocks *s,
-                     msfp_block_directions *ds, msfp_work_columns *d)
+MSFP_INLINE void top_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                             msfp_blocks *s, msfp_block_directions *ds, msfp_work_columns *d)
 {
     msfp_put_polar(ds->load_force, ds->point->load);
     msfp_put_axial(ds->load_moment, ds->point->load + 3);
-    foot_stage(p, dp, s->at, ds->point, ds->foot_stage);
+    foot_stage_columns(p, dp, s->at, ds->point, ds->foot_stage);
 #if MSFP_TOP_ROTATION
     msfp_support_columns(s->at, ds->point, ds->upright);
 #endif
@@ -110,7 +110,7 @@ MSFP_COLUMNWISE void msfp_foot_columns(const msfp_parameters *p, const msfp_para
     double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
     if (msfp_top_is_sprung(p)) {
         msfp_foot_stage(p, at, stage);
-        foot_stage(p, dp, at, dat, dstage);
+        foot_stage_columns(p, dp, at, dat, dstage);
         msfp_foot_direction(p->top, w->body[NB], stage, w->foot, dp->top, d->body[NB], dstage, d->foot);
     } else {
         memcpy(d->foot + MSFP_FOOT_Y * C, d->body[NB] + MSFP_BODY_CZ * C, C * sizeof(double));
@@ -143,8 +143,8 @@ MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp
     ds.slopes = slopes;
     ds.all = wanted & MSFP_OF_ROW;
     msfp_set_loads(p, at, &s);
-    kinematics(p, dp, w, &s, &ds, d);
-    top(p, dp, w, &s, &ds, d);
+    motion_columns(p, dp, w, &s, &ds, d);
+    top_columns(p, dp, w, &s, &ds, d);
     for (int j = 0; j < NB; ++j) {
         memcpy(ds.before[j] + MSFP_BEFORE_Y * C, dat->f[j], MSFP_SHEAR_SIZE * sizeof dat->f[j][0]);
         memcpy(ds.before[j] + MSFP_BEFORE_BETA * C, dat->beta, sizeof dat->beta);
@@ -167,5 +167,43 @@ MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp
         if (!MSFP_PLANAR && MSFP_SPIN_LOCKED)
             memcpy(d->lock[k], ds.angular[k + 1] + (MSFP_ANGULAR_SIZE - 1) * C, sizeof d->lock[k]);
     }
+}
+
+/* As msfp_lu_solve for all columns at once. */
+MSFP_COLUMNWISE void msfp_solve_columns(const double *restrict factors, const int *restrict pivots,
+                                        msfp_columns *restrict columns)
+{
+    enum { PACKS = C / MSFP_PACK_SIZE };
+    msfp_pack *const x = (msfp_pack *)columns;
+    for (int k = 0; k < DOF; ++k)
+        for (int c = 0; c < PACKS; ++c) {
+            const msfp_pack swap = x[pivots[k] * PACKS + c];
+            x[pivots[k] * PACKS + c] = x[k * PACKS + c];
+            x[k * PACKS + c] = swap;
+        }
+    for (int c = 0; c < PACKS; ++c) {
+        for (int i = 1; i < DOF; ++i) {
+            msfp_pack rest = x[i * PACKS + c];
+            for (int j = 0; j < i; ++j)
+                rest -= factors[i * DOF + j] * x[j * PACKS + c];
+            x[i * PACKS + c] = rest;
+        }
+        for (int i = DOF - 1; i >= 0; --i) {
+            msfp_pack rest = x[i * PACKS + c];
+            for (int j = i + 1; j < DOF; ++j)
+                rest -= factors[i * DOF + j] * x[j * PACKS + c];
+            x[i * PACKS + c] = rest * factors[i * DOF + i];
+        }
+    }
+}
+
+MSFP_COLUMNWISE void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[NB][2], msfp_columns f[NB][2])
+{
+    for (int j = 0; j < NB; ++j)
+        for (int i = 0; i < MSFP_SHEAR_SIZE; ++i) {
+            memcpy(df[j][i], d->contact[j] + (MSFP_CONTACT_DY + i) * C, sizeof df[j][i]);
+            if (f)
+                memcpy(f[j][i], d->contact[j] + (MSFP_CONTACT_Y + i) * C, sizeof f[j][i]);
+        }
 }
 #endif

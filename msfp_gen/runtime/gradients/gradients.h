@@ -84,6 +84,10 @@ enum { MSFP_OF_RESIDUAL = 1, MSFP_OF_ROW = 2 };
 void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
                             const msfp_slopes *slopes, int wanted, msfp_work_columns *d);
+/* Solve factors x = columns [MSFP_DOF][MSFP_COLUMNS], in place. */
+void msfp_solve_columns(const double *factors, const int *pivots, msfp_columns *columns);
+/* Columns of the rates of Y, Z, and where f is given of Y, Z. */
+void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[MSFP_NB][2], msfp_columns f[MSFP_NB][2]);
 
 /* ---- contact_columns.c ---- */
 
@@ -197,12 +201,6 @@ struct msfp_gradients {
     msfp_run own;           /* the run, while a step to an event is taken once more */
 };
 
-/* ---- accepted_step.c ---- */
-
-/* Columns of the time from the end of the step to an event there, by those of the state at the end: minus the columns of
- * what decides the event, over its rate. Where that does not change they are zero. */
-void msfp_event_time_columns(msfp_run *run, msfp_parameter_batch *batch, int kind, int j, double *dt);
-
 /* ---- initial_columns.c, step_columns.c: states ---- */
 
 /* The numbers of the columns of a state from a field on. */
@@ -279,10 +277,6 @@ MSFP_INLINE int msfp_last_stage(const msfp_run *run)
 /* Columns of base motion and load at time t [s], whose columns are dt, into `dat`. */
 void msfp_inputs_columns(msfp_run *run, msfp_parameter_batch *batch, double t, const double *dt,
                          msfp_point_columns *dat);
-/* Solve factors x = columns [MSFP_DOF][MSFP_COLUMNS], in place. */
-void msfp_solve_columns(const double *factors, const int *pivots, msfp_columns *columns);
-/* Columns of the rates of Y, Z, and where f is given of Y, Z. */
-void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[MSFP_NB][2], msfp_columns f[MSFP_NB][2]);
 /* Columns of accelerations and rates that are consistent with the present state, after those of q, v, f and the foot;
  * first: at the start of the run, where the columns of the foot follow too. Returns a status. */
 int msfp_initial_columns(msfp_run *run, msfp_parameter_batch *batch, int first);
@@ -300,6 +294,7 @@ void msfp_memory_point_columns(const msfp_state *from, const msfp_state_columns 
 void msfp_memory_state_columns(const msfp_state *s, const msfp_state_columns *dfrom, const msfp_columns source[MSFP_NB],
                              double beta, const double *dbeta, msfp_state_columns *ds);
 #else
+#undef msfp_memory_point_columns /* its prefixed name, see msfp_symbols.h */
 #define msfp_memory_point_columns(from, dfrom, beta, dat) ((void)0)
 #endif
 
@@ -343,6 +338,11 @@ void msfp_extremes_of_step(msfp_run *run, msfp_parameter_batch *batch);
 
 /* ---- recording.c ---- */
 
+/* What decides an event of surface j at the end of the step (msfp_event_columns), and its rate [m/s]. */
+double msfp_event_at_end(msfp_run *run, int kind, int j, double *rate);
+/* Columns of the time from the end of the step to an event there, by those of the state at the end: minus the columns of
+ * what decides the event, over its rate. Where that does not change they are zero. */
+void msfp_event_time_columns(msfp_run *run, msfp_parameter_batch *batch, int kind, int j, double *dt);
 /* Record the columns of the present state, and those of the extremes of a first row. Returns MSFP_OK or
  * MSFP_E_MEMORY. */
 int msfp_record_present_columns(msfp_run *run, int first);
@@ -350,5 +350,11 @@ int msfp_record_present_columns(msfp_run *run, int first);
 int msfp_record_rows_columns(msfp_run *run);
 /* Columns of its events and of the extremes that it changed. Returns MSFP_OK or MSFP_E_MEMORY. */
 int msfp_record_extremes_columns(msfp_run *run);
+
+/* ---- accepted_step.c ---- */
+
+/* Columns of the step that was accepted and recorded, and of what it recorded. before, after: event functions at its
+ * ends. Returns MSFP_OK or a status. */
+int msfp_accepted_step_columns(msfp_run *run, const double *before, const double *after);
 #endif
 #endif

@@ -148,8 +148,8 @@ MSFP_COLUMNWISE void msfp_columns_of_powers(const msfp_parameters *p, const msfp
 }
 
 /* Quantities of surface j. */
-MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
-                         const msfp_work_columns *d, int j, msfp_columns *row)
+MSFP_INLINE void surface_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                                 const msfp_work_columns *d, int j, msfp_columns *row)
 {
     const double *contact = w->contact[j], *dcontact = d->contact[j];
     msfp_columns gap[MSFP_GAP_SIZE], *angles = row + MSFP_ROW_ANGLES + 2 * j, *slip = row + MSFP_ROW_SLIP + 2 * j;
@@ -206,7 +206,7 @@ MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_pa
 #if !MSFP_PLANAR
         memcpy(row[MSFP_ROW_F + 2 * j + 1], d->contact[j] + MSFP_CONTACT_Z * C, sizeof *row);
 #endif
-        surface(p, dp, w, d, j, row);
+        surface_columns(p, dp, w, d, j, row);
     }
     memcpy(row + MSFP_ROW_BASE, dat->base[0], 3 * sizeof *row);
     msfp_get_polar(d->body[NB] + MSFP_BODY_CX * C, row + MSFP_ROW_TOP);

@@ -40,6 +40,46 @@ static void store(const struct msfp_gradients *g, double *items, size_t index, i
             to[c * size + i] = d[i][c];
 }
 
+double msfp_event_at_end(msfp_run *run, int kind, int j, double *rate)
+{
+    static const msfp_parameter_columns constant;
+    msfp_columns rates;
+    msfp_point at;
+    msfp_point_columns dat; /* column 0: derivatives with respect to time */
+    memset(&dat, 0, sizeof dat);
+    msfp_to_point(run, &run->next, &at);
+    dat.base_moves = 1;
+    for (int i = 0; i < 6; ++i) {
+        dat.base[0][i][0] = at.base[1][i];
+        dat.base[1][i][0] = at.base[2][i];
+    }
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < NQ; ++i) {
+            dat.q[k][i][0] = at.v[k][i];
+            dat.v[k][i][0] = at.a[k][i];
+        }
+    const double value = msfp_event_columns(&run->parameters, &constant, &at, &dat, kind, j, rates);
+    *rate = rates[0];
+    return value;
+}
+
+void msfp_event_time_columns(msfp_run *run, msfp_parameter_batch *batch, int kind, int j, double *dt)
+{
+    msfp_columns value;
+    msfp_point at;
+    msfp_point_columns dat;
+    double rate;
+    memset(&dat, 0, sizeof dat);
+    msfp_to_point(run, &run->next, &at);
+    msfp_inputs_columns(run, batch, run->next.t, batch->next.t, &dat);
+    memcpy(dat.q, batch->next.q, sizeof dat.q);
+    memcpy(dat.v, batch->next.v, sizeof dat.v);
+    msfp_event_columns(&run->parameters, &batch->parameters, &at, &dat, kind, j, value);
+    msfp_event_at_end(run, kind, j, &rate);
+    for (int c = 0; c < C; ++c)
+        dt[c] = rate != 0.0 ? -value[c] / rate : 0.0;
+}
+
 /* Columns of an event at the end of the step. Where a surface lifts off or lands, and in a quasi-static run, the end of
  * a step does not move with the parameters: the state at the event moves along the solution. */
 static void event_columns(msfp_run *run, msfp_parameter_batch *batch, int kind, int j, msfp_row_columns d,

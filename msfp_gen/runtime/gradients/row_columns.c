@@ -69,7 +69,7 @@ void msfp_observe_node_columns(msfp_run *run, msfp_parameter_batch *batch)
     if (r->columns_known)
         return;
     if (!r->known)
-        msfp_row_inside(run, 1.0, &row); /* which gives the rows to msfp_gradients_node */
+        msfp_row_inside(run, 1.0, &row); /* which gives the rows to the recording */
     if (!batch->start_known)
         node_columns(run, batch, 0, &run->now, &batch->now, batch->start_row);
     memcpy(r->d[0], batch->start_row, sizeof batch->start_row);

@@ -12,44 +12,6 @@
 enum { STAGES = MSFP_STAGES };
 static const int unknown[ND] = MSFP_FREE;
 
-/* As msfp_lu_solve for all columns at once. */
-MSFP_COLUMNWISE void msfp_solve_columns(const double *restrict factors, const int *restrict pivots,
-                                        msfp_columns *restrict columns)
-{
-    enum { PACKS = C / MSFP_PACK_SIZE };
-    msfp_pack *const x = (msfp_pack *)columns;
-    for (int k = 0; k < DOF; ++k)
-        for (int c = 0; c < PACKS; ++c) {
-            const msfp_pack swap = x[pivots[k] * PACKS + c];
-            x[pivots[k] * PACKS + c] = x[k * PACKS + c];
-            x[k * PACKS + c] = swap;
-        }
-    for (int c = 0; c < PACKS; ++c) {
-        for (int i = 1; i < DOF; ++i) {
-            msfp_pack rest = x[i * PACKS + c];
-            for (int j = 0; j < i; ++j)
-                rest -= factors[i * DOF + j] * x[j * PACKS + c];
-            x[i * PACKS + c] = rest;
-        }
-        for (int i = DOF - 1; i >= 0; --i) {
-            msfp_pack rest = x[i * PACKS + c];
-            for (int j = i + 1; j < DOF; ++j)
-                rest -= factors[i * DOF + j] * x[j * PACKS + c];
-            x[i * PACKS + c] = rest * factors[i * DOF + i];
-        }
-    }
-}
-
-MSFP_COLUMNWISE void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[NB][2], msfp_columns f[NB][2])
-{
-    for (int j = 0; j < NB; ++j)
-        for (int i = 0; i < MSFP_SHEAR_SIZE; ++i) {
-            memcpy(df[j][i], d->contact[j] + (MSFP_CONTACT_DY + i) * C, sizeof df[j][i]);
-            if (f)
-                memcpy(f[j][i], d->contact[j] + (MSFP_CONTACT_Y + i) * C, sizeof f[j][i]);
-        }
-}
-
 /* What the stages before stage i give, as `msfp_stage_begin` forms it, and the columns of the point that follow. */
 MSFP_INLINE void prepare(const msfp_run *run, const msfp_parameter_batch *batch, const msfp_state_columns *stages,
                          const msfp_tableau *method, int i, double h, msfp_state_columns *from, msfp_point_columns *dat)
@@ -78,8 +40,8 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_parameter_batch *batch,
 }
 
 /* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta, at stage i. */
-MSFP_INLINE void stage_point(const msfp_run *run, int i, const msfp_state_columns *restrict from,
-                             msfp_point_columns *restrict dat)
+MSFP_INLINE void stage_point_columns(const msfp_run *run, int i, const msfp_state_columns *restrict from,
+                                     msfp_point_columns *restrict dat)
 {
     const msfp_stage *stage = &run->gradients->stage_history.stage[i];
     const double beta = stage->beta, rate = stage->inertia / beta;
@@ -106,14 +68,14 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_parameter_batch *batch, int i, 
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
             memset(dat->v[k][unknown[d]], 0, sizeof(msfp_columns));
-    stage_point(run, i, from, dat);
+    stage_point_columns(run, i, from, dat);
     msfp_condensed_columns(&run->parameters, &batch->parameters, &stage->at, dat, &stage->seed, &stage_history->work[i],
                            &stage_history->slopes[i], MSFP_OF_RESIDUAL, &batch->work);
     msfp_solve_columns(stage_history->factors[i], stage_history->pivots[i], x);
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
             msfp_add_columns(&dat->v[k][unknown[d]], &x[k * ND + d], -1.0, 1);
-    stage_point(run, i, from, dat);
+    stage_point_columns(run, i, from, dat);
     batch->complete = 0;
 }
 

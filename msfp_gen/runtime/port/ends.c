@@ -139,6 +139,36 @@ void msfp_load_of_interface(const msfp_parameters *p, const double *far_end, dou
     msfp_force_F_get(force, load);
 }
 
+double msfp_port_move_anchor(const msfp_port *port, msfp_run *run, const double *plate, const double *from,
+                             const double *at)
+{
+    double anchor[3] = { 0.0 }, before[3], stored = 0.0;
+    for (int i = 0; i < 2; ++i) {
+        before[i] = port->plate[i] + from[i];
+        anchor[i] = port->plate[i] + at[i];
+        stored += (plate[i] - anchor[i]) * (plate[i] - anchor[i]) - (plate[i] - before[i]) * (plate[i] - before[i]);
+    }
+    msfp_top_parameters_x0_put(run->parameters.top, anchor);
+    return 0.5 * run->parameters.top[MSFP_TOP_PARAMETERS_K] * stored;
+}
+
+void msfp_port_histories(msfp_port *port, const msfp_ends *to, double h)
+{
+    msfp_run *run = &port->committed;
+    msfp_port_paths(port, &run->parameters, run->now.t, run->now.t + h, to);
+    run->motion.held = run->load.held = 0;
+#if MSFP_TOP_ROTATION
+    run->support.held = 0;
+#endif
+}
+
+void msfp_port_hold(msfp_port *port)
+{
+    msfp_run *run = &port->committed;
+    msfp_port_histories(port, &port->from, 1.0);
+    msfp_port_move_anchor(port, run, run->rows[0].top, port->from.of[1][0], port->from.of[1][0]);
+}
+
 void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double *wrench)
 {
     msfp_blocks s;

@@ -110,19 +110,6 @@ int msfp_port_enter(msfp_port *port, const msfp_options *options, const double *
     return status;
 }
 
-double msfp_port_move_anchor(const msfp_port *port, msfp_run *run, const double *plate, const double *from,
-                             const double *at)
-{
-    double anchor[3] = { 0.0 }, before[3], stored = 0.0;
-    for (int i = 0; i < 2; ++i) {
-        before[i] = port->plate[i] + from[i];
-        anchor[i] = port->plate[i] + at[i];
-        stored += (plate[i] - anchor[i]) * (plate[i] - anchor[i]) - (plate[i] - before[i]) * (plate[i] - before[i]);
-    }
-    msfp_top_parameters_x0_put(run->parameters.top, anchor);
-    return 0.5 * run->parameters.top[MSFP_TOP_PARAMETERS_K] * stored;
-}
-
 void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends *to)
 {
     copy_state(run, &port->committed);

@@ -101,13 +101,6 @@ int msfp_valid_ends(const double *ends, int loaded);
 void msfp_attach(msfp_history *history, const double *knots, const msfp_polynomials *polynomials);
 /* Prepare a trial that ends at `t` with the ends at `to`: the histories of `run`, from the committed state. */
 void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends *to);
-/* Wrenches [end][6] of the evaluation in run->work, the ends at `at`. */
-void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double *wrench);
-
-/* Fix the horizontal springs where end B is at u = `at` [m] instead of `from`; returns the change
- * of their energy [J], the top plate at `plate` [m]. */
-double msfp_port_move_anchor(const msfp_port *port, msfp_run *run, const double *plate, const double *from,
-                             const double *at);
 
 /* ---- stage.c: steps by the stages of a method that another program drives ---- */
 
@@ -130,8 +123,6 @@ int msfp_port_tripped(msfp_port *port);
 int msfp_port_step_commit(msfp_port *port, double t);
 /* The accelerations of the ends jump to those of `ends`. Returns MSFP_OK or a status. */
 int msfp_port_jump(msfp_port *port, const double *ends);
-/* Histories that hold the ends as they move in the committed state. */
-void msfp_port_hold(msfp_port *port);
 /* The cause of a `status` that a shorter step does not cure. */
 int msfp_port_cause(msfp_port *port, int status);
 
@@ -149,6 +140,16 @@ void msfp_unit_paths(double h, msfp_polynomials *paths);
 void msfp_far_end(const msfp_port *port, const double *u, const double *v, const double *anchor, double *block);
 /* Force on the top plate [3] that follows from it [N]. */
 void msfp_load_of_interface(const msfp_parameters *p, const double *far_end, double *load);
+/* Fix the horizontal springs where end B is at u = `at` [m] instead of `from`; returns the change
+ * of their energy [J], the top plate at `plate` [m]. */
+double msfp_port_move_anchor(const msfp_port *port, msfp_run *run, const double *plate, const double *from,
+                             const double *at);
+/* The histories of the committed run over a step of length h [s] to the ends at `to`. */
+void msfp_port_histories(msfp_port *port, const msfp_ends *to, double h);
+/* Histories and springs that hold the ends as they move in the committed state. */
+void msfp_port_hold(msfp_port *port);
+/* Wrenches [end][6] of the evaluation in run->work, the ends at `at`. */
+void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double *wrench);
 
 /* ---- derivatives.c ---- */
 

@@ -86,17 +86,6 @@ int msfp_port_stage(msfp_port *port, int i, const double *ends, double *wrench)
 
 /* ---- the end of a step ---- */
 
-/* The histories of the committed run between the ends of a step of length h [s]. */
-static void set_histories(msfp_port *port, const msfp_ends *to, double h)
-{
-    msfp_run *run = &port->committed;
-    msfp_port_paths(port, &run->parameters, run->now.t, run->now.t + h, to);
-    run->motion.held = run->load.held = 0;
-#if MSFP_TOP_ROTATION
-    run->support.held = 0;
-#endif
-}
-
 int msfp_port_step_end(msfp_port *port, double *error, double *share)
 {
     msfp_run *run = &port->committed;
@@ -120,7 +109,7 @@ int msfp_port_step_end(msfp_port *port, double *error, double *share)
     msfp_body_C_get(run->work.body[NB], plate);
     step->energy = run->next.energy + msfp_port_move_anchor(port, run, plate, step->anchor, port->to.of[1][0]);
 #if MSFP_UPLIFT
-    set_histories(port, &port->to, step->stages.h); /* event functions read them there */
+    msfp_port_histories(port, &port->to, step->stages.h); /* event functions read them there */
 #endif
     msfp_event_values(run, &run->next, step->after);
     *share = msfp_first_event(run, run->events_now, step->after);
@@ -160,13 +149,6 @@ int msfp_port_step_commit(msfp_port *port, double t)
     row->time = t;
     memcpy(row->work, run->now.work, sizeof row->work);
     return MSFP_OK;
-}
-
-void msfp_port_hold(msfp_port *port)
-{
-    msfp_run *run = &port->committed;
-    set_histories(port, &port->from, 1.0);
-    msfp_port_move_anchor(port, run, run->rows[0].top, port->from.of[1][0], port->from.of[1][0]);
 }
 
 int msfp_port_jump(msfp_port *port, const double *ends)

@@ -125,9 +125,9 @@ static void observe_nodes(msfp_run *run, msfp_row rows[MSFP_NODES + 2])
         const msfp_state *s = i == 0 ? &run->now : i == last ? &run->next : &inside;
         if (s == &inside)
             msfp_interpolate(run, run->node[i - 1].share, &inside);
-        msfp_observation *o = MSFP_IF_GRADIENTS(msfp_gradients_node(run, i), NULL);
+        msfp_observation *o = MSFP_HOOK(run, place_of_node(run, i), NULL);
         observe(run, s, o ? o : &own, &rows[i]);
-        MSFP_IF_GRADIENTS(msfp_gradients_row(run, i, &rows[i]), (void)0);
+        MSFP_HOOK(run, node_observed(run, i, &rows[i]), (void)0);
     }
 }
 

@@ -49,7 +49,7 @@ int msfp_classify_failure(msfp_run *run, int status);
 /* ---- output.c; writing returns MSFP_OK or MSFP_E_MEMORY ---- */
 
 /* The evaluation of a state outside of a step; g: the friction force over -mu N. */
-typedef struct {
+typedef struct msfp_observation {
     msfp_point at;
     msfp_seed seed;
     double g[MSFP_NB][2];
@@ -73,26 +73,5 @@ int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind);
 
 /* Whether all of `count` numbers are finite; NULL counts as finite. */
 int msfp_all_finite(const double *values, size_t count);
-
-/* ---- gradients: the hooks of models with them; those that return an int return a status ---- */
-#if MSFP_GRADIENTS
-#define MSFP_IF_GRADIENTS(call, otherwise) (call)
-#else
-#define MSFP_IF_GRADIENTS(call, otherwise) (otherwise)
-#endif
-/* Length of the next step where the ends of the steps are prescribed [s]; 0: they are not. */
-double msfp_prescribed_step(const msfp_run *run);
-/* Before an accepted step is recorded; after it is recorded; once its end is the present state. */
-void msfp_gradients_before_step(msfp_run *run);
-int msfp_gradients_step(msfp_run *run, const double *before, const double *after);
-void msfp_gradients_accept(msfp_run *run);
-/* Where to evaluate row `index` of those at the ends of the last step and at its interpolation nodes, and then the row;
- * NULL: anywhere. */
-msfp_observation *msfp_gradients_node(msfp_run *run, int index);
-void msfp_gradients_row(msfp_run *run, int index, const msfp_row *row);
-/* After a jump of the accelerations; after a last row of a run that was stopped. */
-int msfp_gradients_jump(msfp_run *run);
-int msfp_gradients_last_row(msfp_run *run);
-void msfp_gradients_free(msfp_run *run);
 
 #endif

@@ -137,6 +137,12 @@ static void *copied(const unsigned char *items, size_t size)
     return copy;
 }
 
+static void release_records(msfp_run *run)
+{
+    free(run->rows);
+    free(run->events);
+}
+
 static int valid_header(const header *h, uint64_t identity, const unsigned char *body, size_t size)
 {
     if (identity && h->identity != identity)
@@ -169,10 +175,10 @@ int msfp_snapshot_read(msfp_run *run, const void *snapshot, size_t size)
     found.event_count = found.event_capacity = h.event_count;
     const int memory = found.rows && found.events;
     if (!memory || !valid_integers(&found) || !valid_numbers(&found) || !valid_records(&found)) {
-        msfp_run_free(&found);
+        release_records(&found);
         return memory ? MSFP_E_FINITE : MSFP_E_MEMORY;
     }
-    msfp_run_free(run);
+    release_records(run);
     *run = found;
     return MSFP_OK;
 }

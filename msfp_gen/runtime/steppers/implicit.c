@@ -111,9 +111,7 @@ static double unit_disc_error(const msfp_run *run, const msfp_stage *s)
 void msfp_stage_end(msfp_run *run, msfp_stages *s, int i)
 {
     memcpy(s->now.at.f, s->now.f, sizeof s->now.at.f);
-#if MSFP_GRADIENTS
-    msfp_gradients_stage(run, i, &s->now);
-#endif
+    MSFP_HOOK(run, stage_solved(run, i, &s->now), (void)0);
     msfp_state *stage = &s->stage[i];
     stage->t = run->now.t + s->method->c[i] * s->h;
     stage->energy = 0.0; /* known once the step is accepted */
@@ -209,9 +207,7 @@ void msfp_stages_end(msfp_run *run, msfp_stages *s, double *error)
     other = fmax(other, msfp_memory_error(run, &estimate, next, s->now.beta));
     *error = fmax(other, msfp_error_norm(run, &estimate, 0));
     refine_integrals(s, h, *error > 1.0, next->work);
-#if MSFP_GRADIENTS
-    msfp_gradients_states(run, s, *error > 1.0);
-#endif
+    MSFP_HOOK(run, stages_ended(run, s, *error > 1.0), (void)0);
     if (*error > 1.0) {
         filter(run, s, &estimate);
         *error = fmax(other, msfp_error_norm(run, &estimate, 0));

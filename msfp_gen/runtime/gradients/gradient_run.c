@@ -1,4 +1,4 @@
-/* gradients.c: the derivatives of a run: their inputs, the hooks in the loop of the run. */
+/* gradient_run.c: the derivatives of a run: their inputs, the hooks in the loop of the run, what was recorded. */
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -91,12 +91,101 @@ static void fill_batch(const msfp_run *run, const msfp_gradient_inputs *in, int 
     parameters(&run->parameters, &values, &batch->parameters);
 }
 
+/* ---- hooks ---- */
+
+static double prescribed_step(const msfp_run *run)
+{
+    const struct msfp_gradients *g = run->gradients;
+    return g->step < g->step_count ? g->steps[g->step] - run->now.t : 0.0;
+}
+
+static void stage_solved(msfp_run *run, int i, const msfp_stage *stage)
+{
+    msfp_stage_history *stage_history = &run->gradients->stage_history;
+    stage_history->stage[i] = *stage;
+    memcpy(&stage_history->work[i], &run->work, offsetof(msfp_work, dx)); /* without derivatives */
+}
+
+static void stages_ended(msfp_run *run, const msfp_stages *s, int ringing)
+{
+    memcpy(run->gradients->stage_history.state, s->stage, sizeof s->stage);
+    run->gradients->stage_history.ringing = ringing;
+}
+
+static void before_step(msfp_run *run)
+{
+    run->gradients->recording.known = 0;
+    run->gradients->extremes = run->extremes;
+    run->gradients->outward_rate = run->outward_rate;
+}
+
+static void step_accepted(msfp_run *run)
+{
+    for (int i = 0; i < run->gradients->batches; ++i) {
+        msfp_parameter_batch *batch = &run->gradients->batch[i];
+        batch->now = batch->next;
+        batch->start_known = batch->end_known;
+        if (batch->end_known)
+            memcpy(batch->start_row, batch->end_row, sizeof batch->end_row);
+    }
+}
+
+static msfp_observation *place_of_node(msfp_run *run, int index) { return &run->gradients->recording.node[index]; }
+
+static void node_observed(msfp_run *run, int index, const msfp_row *row)
+{
+    msfp_recording *r = &run->gradients->recording;
+    r->value[index] = *row;
+    r->sloped[index] = 0;
+    r->known = index == run->node_count + 1;
+}
+
+static int jumped(msfp_run *run)
+{
+    int status = MSFP_OK;
+    for (int i = 0; i < run->gradients->batches && status == MSFP_OK; ++i) {
+        run->gradients->batch[i].start_known = 0;
+        status = msfp_initial_columns(run, &run->gradients->batch[i], 0);
+    }
+    return status;
+}
+
+static int last_row_written(msfp_run *run)
+{
+    return run->gradients->count ? msfp_record_present_columns(run, 0) : MSFP_OK;
+}
+
+static void released(msfp_run *run)
+{
+    free(run->gradients->batch);
+    free(run->gradients->rows);
+    free(run->gradients->events);
+    free(run->gradients);
+    run->gradients = NULL;
+    run->hooks = NULL;
+}
+
+static const struct msfp_hooks hooks = {
+    .prescribed_step = prescribed_step,
+    .stage_solved = stage_solved,
+    .stages_ended = stages_ended,
+    .before_step = before_step,
+    .step_recorded = msfp_accepted_step_columns,
+    .step_accepted = step_accepted,
+    .place_of_node = place_of_node,
+    .node_observed = node_observed,
+    .jumped = jumped,
+    .last_row_written = last_row_written,
+    .released = released,
+};
+
 int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *in)
 {
     struct msfp_gradients *g = calloc(1, sizeof *g);
     if (!g)
         return run->status = MSFP_E_MEMORY;
     run->gradients = g;
+    run->hooks = &hooks;
     g->count = in->count;
     g->batches = (in->count + C - 1) / C;
     g->energies = in->energies;
@@ -113,17 +202,6 @@ int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *in)
     if (run->status == MSFP_OK && g->count)
         run->status = msfp_record_present_columns(run, 1);
     return run->status;
-}
-
-void msfp_gradients_free(msfp_run *run)
-{
-    if (!run->gradients)
-        return;
-    free(run->gradients->batch);
-    free(run->gradients->rows);
-    free(run->gradients->events);
-    free(run->gradients);
-    run->gradients = NULL;
 }
 
 const double *msfp_gradient_rows(const msfp_run *run, size_t *count)
@@ -145,79 +223,5 @@ void msfp_gradient_extremes(const msfp_run *run, int parameter, double *out)
     const msfp_parameter_batch *batch = &run->gradients->batch[parameter / C];
     for (size_t i = 0; i < sizeof(msfp_extremes) / sizeof(double); ++i)
         out[i] = batch->extremes[i][parameter % C];
-}
-
-/* ---- hooks ---- */
-
-double msfp_prescribed_step(const msfp_run *run)
-{
-    const struct msfp_gradients *g = run->gradients;
-    return g && g->step < g->step_count ? g->steps[g->step] - run->now.t : 0.0;
-}
-
-void msfp_gradients_stage(msfp_run *run, int i, const msfp_stage *stage)
-{
-    if (!run->gradients)
-        return;
-    run->gradients->stage_history.stage[i] = *stage;
-    memcpy(&run->gradients->stage_history.work[i], &run->work, offsetof(msfp_work, dx)); /* without derivatives */
-}
-
-void msfp_gradients_states(msfp_run *run, const msfp_stages *s, int ringing)
-{
-    if (!run->gradients)
-        return;
-    memcpy(run->gradients->stage_history.state, s->stage, sizeof s->stage);
-    run->gradients->stage_history.ringing = ringing;
-}
-
-msfp_observation *msfp_gradients_node(msfp_run *run, int index)
-{
-    return run->gradients ? &run->gradients->recording.node[index] : NULL;
-}
-
-void msfp_gradients_row(msfp_run *run, int index, const msfp_row *row)
-{
-    if (!run->gradients)
-        return;
-    msfp_recording *r = &run->gradients->recording;
-    r->value[index] = *row;
-    r->sloped[index] = 0;
-    r->known = index == run->node_count + 1;
-}
-
-void msfp_gradients_before_step(msfp_run *run)
-{
-    if (!run->gradients)
-        return;
-    run->gradients->recording.known = 0;
-    run->gradients->extremes = run->extremes;
-    run->gradients->outward_rate = run->outward_rate;
-}
-
-void msfp_gradients_accept(msfp_run *run)
-{
-    for (int i = 0; run->gradients && i < run->gradients->batches; ++i) {
-        msfp_parameter_batch *batch = &run->gradients->batch[i];
-        batch->now = batch->next;
-        batch->start_known = batch->end_known;
-        if (batch->end_known)
-            memcpy(batch->start_row, batch->end_row, sizeof batch->end_row);
-    }
-}
-
-int msfp_gradients_jump(msfp_run *run)
-{
-    int status = MSFP_OK;
-    for (int i = 0; run->gradients && i < run->gradients->batches && status == MSFP_OK; ++i) {
-        run->gradients->batch[i].start_known = 0;
-        status = msfp_initial_columns(run, &run->gradients->batch[i], 0);
-    }
-    return status;
-}
-
-int msfp_gradients_last_row(msfp_run *run)
-{
-    return run->gradients && run->gradients->count ? msfp_record_present_columns(run, 0) : MSFP_OK;
 }
 #endif
