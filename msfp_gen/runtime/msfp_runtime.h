@@ -418,12 +418,10 @@ struct msfp_run {
 #define MSFP_SNAPSHOT_END offsetof(msfp_run, rows)
 
 /* Start a run at q, v [MSFP_NB][MSFP_NQ] and f [MSFP_NB][2]: a consistent initial state and the first row. jumps
- * [jump_count]: rising times [s]. Histories and jumps must outlive the run. Returns run->status. */
+ * [jump_count]: rising times [s]; support: NULL where that of the top plate does not rotate. Histories and jumps must
+ * outlive the run. Returns run->status. */
 int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
-#if MSFP_TOP_ROTATION
-                   const msfp_history *support,
-#endif
-                   const double *jumps, int jump_count, const msfp_options *options,
+                   const msfp_history *support, const double *jumps, int jump_count, const msfp_options *options,
                    const double *q, const double *v, const double *f);
 /* Take up to `steps` steps. Returns 1 while there is more to do, 0 at the end (see run->status). Between two calls the
  * coefficients of a history may be changed from run->now.t on; its values, and the rates of the motion, stay

@@ -66,7 +66,7 @@ EXPORTED(begin) void begin(const double *input)
     msfp_set_parameters(&parameters, number[0], bodies, surfaces, top);
     msfp_run_free(&run);
     memset(&run, 0, sizeof run);
-    msfp_run_start(&run, &parameters, &motion, &load, jump, jumps, &options, q, v, f);
+    msfp_run_start(&run, &parameters, &motion, &load, NULL, jump, jumps, &options, q, v, f);
 }
 
 /* Take so many steps at most. Returns whether the run goes on. */

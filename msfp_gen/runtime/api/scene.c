@@ -83,17 +83,12 @@ int msfp_api_run_new(const msfp_scene *scene, msfp_run **run, const char **messa
     msfp_run *made = calloc(1, sizeof *made);
     if (!made)
         return MSFP_E_MEMORY;
-    const msfp_history motion = history_of(&scene->motion), load = history_of(&scene->load);
+    const msfp_history motion = history_of(&scene->motion), load = history_of(&scene->load),
+                       support = history_of(&scene->support);
     const msfp_options options = msfp_scene_options(scene);
     const double *q = scene->q ? scene->q : zero, *v = scene->v ? scene->v : zero, *f = scene->f ? scene->f : zero;
-#if MSFP_TOP_ROTATION
-    const msfp_history support = history_of(&scene->support);
     msfp_run_start(made, &scene->bearing->parameters, &motion, &load, &support, scene->jumps, scene->jump_count,
                    &options, q, v, f);
-#else
-    msfp_run_start(made, &scene->bearing->parameters, &motion, &load, scene->jumps, scene->jump_count, &options, q, v,
-                   f);
-#endif
     if (scene->monitor_heat)
         memcpy(made->monitor.heat, scene->monitor_heat, sizeof made->monitor.heat);
     made->options.origin = made->options.foot = made->options.memory = NULL; /* need not outlive this call */

@@ -39,16 +39,20 @@ int msfp_api_port_trial(msfp_port *port, double time, const double *ends, const 
     return wrong ? wrong : msfp_port_trial(port, time, ends);
 }
 
+/* Whether results of a two-port can be written to `to`. */
+static int check_results(const msfp_port *port, const double *to)
+{
+    if (port && port->committed.status)
+        return port->committed.status;
+    return port && to ? MSFP_OK : MSFP_E_ARGUMENT;
+}
+
 int msfp_api_port_wrench(const msfp_port *port, double *wrench)
 {
-    if (!port)
-        return MSFP_E_ARGUMENT;
-    if (port->committed.status)
-        return port->committed.status;
-    if (!wrench)
-        return MSFP_E_ARGUMENT;
-    msfp_port_wrench(port, wrench);
-    return MSFP_OK;
+    const int wrong = check_results(port, wrench);
+    if (!wrong)
+        msfp_port_wrench(port, wrench);
+    return wrong;
 }
 
 static int check_direction(const msfp_port *port, const double *direction)
@@ -78,14 +82,10 @@ int msfp_api_port_row_derivative(msfp_port *port, const double *direction, doubl
 
 int msfp_api_port_row(const msfp_port *port, double *row)
 {
-    if (!port)
-        return MSFP_E_ARGUMENT;
-    if (port->committed.status)
-        return port->committed.status;
-    if (!row)
-        return MSFP_E_ARGUMENT;
-    memcpy(row, msfp_port_row(port), sizeof(msfp_row));
-    return MSFP_OK;
+    const int wrong = check_results(port, row);
+    if (!wrong)
+        memcpy(row, msfp_port_row(port), sizeof(msfp_row));
+    return wrong;
 }
 
 void msfp_api_port_progress(const msfp_port *port, msfp_progress *trial)

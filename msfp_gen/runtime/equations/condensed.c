@@ -42,7 +42,9 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
     return MSFP_OK;
 }
 
-void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale)
+/* Natural size of each residual [MSFP_DOF]: (N + rim force) R (mu + 1/100) of the surface below; of a force N + rim
+ * force. */
+static void residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale)
 {
     for (int k = 0; k < NB; ++k) {
         const double *par = p->surface[k];
@@ -102,7 +104,7 @@ void msfp_friction_state(const msfp_work *w, double f[MSFP_NB][2])
 double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const double *residual, int *worst)
 {
     double scale[DOF], size = 0.0;
-    msfp_residual_scale(p, w, scale);
+    residual_scale(p, w, scale);
     for (int i = 0; i < DOF; ++i) {
         const double one = fabs(residual[i]) / scale[i];
         if (one <= size)

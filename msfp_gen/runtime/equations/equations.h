@@ -122,9 +122,6 @@ void msfp_work_of_slip(const double *par, const double *slip, const double *end,
 
 /* ---- condensed.c, and its tangent in tangent.c or in tangent_forward.c ---- */
 
-/* Natural size of each residual [MSFP_DOF]: (N + rim force) R (mu + 1/100) of the surface below; of a force N + rim
- * force. */
-void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale);
 /* Largest residual relative to its natural size, infinite where one is not finite. worst: its row, unchanged if all are
  * zero. */
 double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const double *residual, int *worst);
@@ -143,8 +140,6 @@ void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const double *dfo
 
 /* What energies and powers are given beside the evaluation: motion of the base, load, axis of a rotating support. */
 void msfp_set_observed(const msfp_point *at, msfp_blocks *s);
-/* Motion of the base as the block `base_motion`. */
-void msfp_base_motion(const msfp_point *at, double *base);
 /* Gap of the rim of surface j and its rate, as the block `closed_rim`. */
 void msfp_gap_of_rim(const msfp_work *w, int j, double *rim);
 /* Power that plastic slip and the drilling moment dissipate at surface j [W]. */

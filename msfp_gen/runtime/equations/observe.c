@@ -8,7 +8,8 @@
 #include "msfp_kernels.h"
 #include "msfp_schedule.h"
 
-void msfp_base_motion(const msfp_point *at, double *base)
+/* Motion of the base as the block `base_motion`. */
+static void base_motion(const msfp_point *at, double *base)
 {
     msfp_base_motion_O_put(base, at->base[0]);
     msfp_base_motion_U_put(base, at->base[1]);
@@ -17,7 +18,7 @@ void msfp_base_motion(const msfp_point *at, double *base)
 
 void msfp_set_observed(const msfp_point *at, msfp_blocks *s)
 {
-    msfp_base_motion(at, s->base_motion);
+    base_motion(at, s->base_motion);
     msfp_force_F_put(s->load_force, at->load);
     msfp_moment_M_put(s->load_moment, at->load + 3);
 #if MSFP_TOP_ROTATION
@@ -28,7 +29,7 @@ void msfp_set_observed(const msfp_point *at, msfp_blocks *s)
 msfp_mechanical msfp_mechanical_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w)
 {
     msfp_blocks s;
-    msfp_base_motion(at, s.base_motion);
+    base_motion(at, s.base_motion);
     msfp_mechanical_values(p, w, &s);
     const msfp_mechanical total = { s.energy[MSFP_ENERGY_KINETIC], s.energy[MSFP_ENERGY_POTENTIAL],
                                     s.energy[MSFP_ENERGY_POWER] };

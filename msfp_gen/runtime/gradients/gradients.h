@@ -256,14 +256,6 @@ MSFP_INLINE void msfp_put_polar(double *block, const msfp_columns *vector)
         memcpy(block + i * MSFP_COLUMNS, vector[MSFP_PLANAR ? 2 * i : i], sizeof *vector);
 }
 /* The same of an axial vector, which in the plane has E2 only. */
-MSFP_INLINE void msfp_get_axial(const double *block, msfp_columns *vector)
-{
-    memset(vector, 0, 3 * sizeof *vector);
-    for (int i = 0; i < MSFP_MOMENT_SIZE; ++i)
-        memcpy(vector[MSFP_PLANAR ? 1 : i], block + i * MSFP_COLUMNS, sizeof *vector);
-}
-
-/* The inverse. */
 MSFP_INLINE void msfp_put_axial(double *block, const msfp_columns *vector)
 {
     for (int i = 0; i < MSFP_MOMENT_SIZE; ++i)
@@ -318,8 +310,6 @@ void msfp_quasistatic_works(msfp_run *run, msfp_parameter_batch *batch);
 /* Columns of the row of a state; ds: columns of the state. */
 void msfp_observe_columns(msfp_run *run, msfp_parameter_batch *batch, const msfp_state *s, const msfp_state_columns *ds,
                           msfp_row_columns d);
-/* Columns of the rows at the ends and nodes of the step, into the recording, unless they are there. */
-void msfp_observe_node_columns(msfp_run *run, msfp_parameter_batch *batch);
 /* Columns of the row at a share of the last step; moving: whether the share is a fixed time, and so depends on the
  * parameters where the ends of the step do. */
 void msfp_row_between_columns(msfp_run *run, msfp_parameter_batch *batch, double share, int moving, msfp_row_columns d);

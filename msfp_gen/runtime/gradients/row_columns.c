@@ -61,7 +61,8 @@ static void accelerations_inside(const msfp_parameter_batch *batch, double share
         out[i] = (1.0 - share) * a[i] + share * b[i];
 }
 
-void msfp_observe_node_columns(msfp_run *run, msfp_parameter_batch *batch)
+/* Columns of the rows at the ends and nodes of the step, into the recording, unless they are there. */
+static void all_node_columns(msfp_run *run, msfp_parameter_batch *batch)
 {
     msfp_recording *r = &run->gradients->recording;
     const int last = run->node_count + 1;
@@ -164,7 +165,7 @@ static void restore_bounds(msfp_run *run, msfp_parameter_batch *batch, const msf
 MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batch *batch, double share, int moving,
                                               msfp_row_columns d)
 {
-    msfp_observe_node_columns(run, batch);
+    all_node_columns(run, batch);
     const msfp_recording *rows = &run->gradients->recording;
     const msfp_weights w = msfp_weights_at(run, share);
     const double h = run->next.t - run->now.t;

@@ -29,27 +29,18 @@ static void copy_state(msfp_run *to, const msfp_run *from)
            MSFP_SNAPSHOT_END - MSFP_SNAPSHOT_BEGIN);
 }
 
-static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q,
-                 const double *v, const double *f)
-{
-    msfp_history motion, load;
-    msfp_attach(&motion, port->knots, &port->motion);
-    msfp_attach(&load, port->knots, &port->load);
-#if MSFP_TOP_ROTATION
-    msfp_history support;
-    msfp_attach(&support, port->knots, &port->support);
-    return msfp_run_start(&port->committed, p, &motion, &load, &support, NULL, 0, options, q, v, f);
-#else
-    return msfp_run_start(&port->committed, p, &motion, &load, NULL, 0, options, q, v, f);
-#endif
-}
-
 /* Start the committed run; the trial begins as a copy of it. Returns its status. */
 static int begin(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q,
                  const double *v, const double *f)
 {
     const uint64_t identity = port->committed.identity;
-    const int status = start(port, p, options, q, v, f);
+    msfp_history motion, load, support = { 0 };
+    msfp_attach(&motion, port->knots, &port->motion);
+    msfp_attach(&load, port->knots, &port->load);
+#if MSFP_TOP_ROTATION
+    msfp_attach(&support, port->knots, &port->support);
+#endif
+    const int status = msfp_run_start(&port->committed, p, &motion, &load, &support, NULL, 0, options, q, v, f);
     port->committed.identity = identity;
     port->run = port->committed;
     port->run.rows = NULL;

@@ -62,10 +62,7 @@ static void copy_history(msfp_history *own, const msfp_history *given)
 }
 
 int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
-#if MSFP_TOP_ROTATION
-                   const msfp_history *support,
-#endif
-                   const double *jumps, int jump_count, const msfp_options *options,
+                   const msfp_history *support, const double *jumps, int jump_count, const msfp_options *options,
                    const double *q, const double *v, const double *f)
 {
     memset(run, 0, sizeof *run);
@@ -74,6 +71,8 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
     copy_history(&run->load, load);
 #if MSFP_TOP_ROTATION
     copy_history(&run->support, support);
+#else
+    (void)support;
 #endif
     run->jumps = jumps;
     run->jump_count = jump_count;

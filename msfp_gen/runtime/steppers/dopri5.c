@@ -54,11 +54,7 @@ static void stage_point(msfp_run *run, const msfp_state *stages, int i, double h
 {
     *from = run->now;
     msfp_add_rates(from, stages, a[i], i, h);
-    memcpy(at->q, from->q, sizeof at->q);
-    memcpy(at->v, from->v, sizeof at->v);
-    memcpy(at->f, from->f, sizeof at->f);
-    memcpy(at->foot, from->foot, sizeof at->foot);
-    msfp_memory_point(from, 0.0, at);
+    msfp_place(from, at);
 }
 
 /* Integrals of the energy balance by Simpson's rule: the power of a rim damper is a peak that lasts only a few

@@ -102,16 +102,21 @@ void msfp_powers_of(const msfp_run *run, const msfp_point *at, msfp_state *s)
     s->load_power = parts.load;
 }
 
+void msfp_place(const msfp_state *s, msfp_point *at)
+{
+    memcpy(at->q, s->q, sizeof at->q);
+    memcpy(at->v, s->v, sizeof at->v);
+    memcpy(at->f, s->f, sizeof at->f);
+    memcpy(at->foot, s->foot, sizeof at->foot);
+    msfp_memory_point(s, 0.0, at);
+}
+
 void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
 {
     memset(at, 0, sizeof *at);
     msfp_point_at(run, s->t, at);
-    memcpy(at->q, s->q, sizeof at->q);
-    memcpy(at->v, s->v, sizeof at->v);
+    msfp_place(s, at);
     memcpy(at->a, s->a, sizeof at->a);
-    memcpy(at->f, s->f, sizeof at->f);
-    memcpy(at->foot, s->foot, sizeof at->foot);
-    msfp_memory_point(s, 0.0, at);
 }
 
 double msfp_absolute_tolerance(const msfp_run *run, int j, int d)

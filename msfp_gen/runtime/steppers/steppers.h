@@ -26,7 +26,8 @@ double msfp_control_order(int method);
 
 /* Base motion, load and rotation of the support at time t [s], into `at`. */
 void msfp_point_at(msfp_run *run, double t, msfp_point *at);
-/* The point of a state. */
+/* What is integrated of a state, into `at`; then the whole point of a state. */
+void msfp_place(const msfp_state *s, msfp_point *at);
 void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at);
 /* Weights of the start of the last step, its interpolation nodes and its end in the polynomial through all of them. */
 typedef struct {

@@ -106,7 +106,7 @@ static int integrate(const msfp_parameters *p)
     options.max_steps = 1e6;
     options.duration = 2.0;
     options.output_step = 0.02;
-    msfp_run_start(&run, p, &motion, &load, NULL, 0, &options, zero, zero, zero);
+    msfp_run_start(&run, p, &motion, &load, NULL, NULL, 0, &options, zero, zero, zero);
     while (msfp_run_advance(&run, 50))
         ;
     for (size_t i = 0; i < run.row_count; ++i) {
