@@ -59,7 +59,7 @@ clang: $(STAMP)
 
 # What needs ziglang (100 MB from PyPI): models without a C compiler, libraries for other platforms, the explorer.
 zig: $(ZIG)
-	$(BIN)/python -m pytest -q -n auto --dist loadfile tests/unit/jit/test_zig.py tests/unit/embedding/test_targets.py tests/unit/explorer
+	$(BIN)/python -m pytest -q -n auto --dist loadfile tests/unit/jit/test_zig.py tests/unit/embedding/test_targets.py tests/unit/report/test_explorer_browser.py tests/unit/report/test_problem.py
 
 # Random scenes against each other: half an hour. See docs/stability.md.
 fuzz: $(STAMP)

@@ -20,10 +20,9 @@ from quick import docs_folder, parser, pick
 from msfp_gen import RunError, Scene
 from msfp_gen.common.output import replacing
 from msfp_gen.common.tables import markdown_table
-from msfp_gen.studies.accuracy import model_errors, output, simulate_within, work_precision
+from msfp_gen.studies.accuracy import model_errors, simulate_within, work_precision
 from msfp_gen.studies.accuracy.error_target import largest_error
-from msfp_gen.studies.accuracy.output import machine
-from msfp_gen.studies.accuracy.study import Point, Study, without_stop
+from msfp_gen.studies.accuracy.study import Point, Study, draw, machine, reference_text, without_stop, write_csv
 from msfp_gen.studies.accuracy.timed_run import errors, run_native
 
 HERE = Path(__file__).resolve().parent
@@ -170,15 +169,15 @@ def measured(case: Case, folder: Path, kind: str) -> tuple[str, Study]:
         else model_errors(case.loaded, tolerances=MODEL_TOLERANCES, limit=case.limit)
     )
     stem = f"accuracy-{'models-' if kind == 'model-error' else ''}{case.scene}"
-    output.draw(study, folder / "figures" / f"{stem}.png")
-    output.write_csv(study, folder / "figures" / f"{stem}.csv")
+    draw(study, folder / "figures" / f"{stem}.png")
+    write_csv(study, folder / "figures" / f"{stem}.csv")
     say(f"{kind} of {case.scene}: {time.perf_counter() - begin:.0f} s")
     table = method_table(study) if kind == "work-precision" else model_table(study)
     notes = " ".join(f"{note[0].upper()}{note[1:]}." for note in study.notes if "not tried" not in note)
     at = f"Within {percent(target(study))}:\n\n" if kind == "work-precision" else ""
     return (
         f"### {case.title}\n\n![{kind} of {case.scene}](figures/{stem}.png)\n\n{at}{table}\n\n"
-        f"Reference: {output.reference_text(study)}. {notes}".rstrip()
+        f"Reference: {reference_text(study)}. {notes}".rstrip()
         + "\n"
     ), study
 
@@ -214,7 +213,7 @@ def peer_method_section(share: float) -> dict[str, str]:
         "report_table": markdown_table(head, rows),
         "report_steps": f"{rate:.0f}",
         "report_wrong": f"{min(wrong):g} and looser" if wrong else "none of these tolerances",
-        "report_reference": output.reference_text(study),
+        "report_reference": reference_text(study),
     }
 
 

@@ -6,7 +6,7 @@ from quick import docs_folder, parser
 
 from msfp_gen import load_scene
 from msfp_gen.studies.bounding import bound, load_factors
-from msfp_gen.studies.bounding.output import plot_bounds
+from msfp_gen.studies.bounding.runs import plot_bounds
 
 if __name__ == "__main__":
     parser(__doc__).parse_args()

@@ -22,8 +22,8 @@ from quick import parser, pick
 
 from msfp_gen import Auto, Effects, Load, Motion, Scene, Top, presets, simulate
 from msfp_gen.generator import generate
-from msfp_gen.result import Result
-from msfp_gen.specification.heat_kernel import HEAT_KERNEL
+from msfp_gen.simulation.result import Result
+from msfp_gen.specification.friction_laws import HEAT_KERNEL
 from msfp_gen.specification.layout import ModelSpec
 
 SCENE, REPEATS = "fenz-test2", pick(15, 1)

@@ -19,7 +19,8 @@ from embedding_ports import doors, worked_example
 from quick import parser, pick
 
 from msfp_gen import Layout, build_model
-from msfp_gen.embedding import export_library, values
+from msfp_gen.embedding import values
+from msfp_gen.embedding.library import export_library
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.specification.layout import ModelSpec
 

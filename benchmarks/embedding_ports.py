@@ -17,9 +17,9 @@ import numpy as np
 from quick import installed
 
 from msfp_gen import Effects, Layout, Solver, Top, TwoPort, presets
-from msfp_gen.coupling.server import Server
-from msfp_gen.embedding import export_library
-from msfp_gen.fmu import write_fmu
+from msfp_gen.embedding.library import export_library
+from msfp_gen.embedding.server import Server
+from msfp_gen.embedding.unit import write_fmu
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.model.evaluation import bodies_and_surfaces, top_values
 from msfp_gen.specification.layout import ModelSpec

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from quick import installed, parser, pick
 
-from msfp_gen.explorer import EXPLORED, write_explorer
+from msfp_gen.report.explore import EXPLORED, write_explorer
 
 sys.path.append(str(Path(__file__).parents[1]))
 from tests.support.explorer_page import CHROMIUM, DRIVER, SLIDE, act, choose_preset, explorer_in_browser

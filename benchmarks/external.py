@@ -19,10 +19,10 @@ from drawing import Array
 from scipy.optimize import brentq
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top, simulate
-from msfp_gen.scene.backbone import series_links
+from msfp_gen.scene.fidelity import series_links
 from msfp_gen.scene.scene_fields import InitialState
-from msfp_gen.studies.accuracy.models import run_opensees
-from msfp_gen.studies.accuracy.opensees import YIELD as LEAST_YIELD
+from msfp_gen.studies.accuracy.series import YIELD as LEAST_YIELD
+from msfp_gen.studies.accuracy.series import run_opensees
 from msfp_gen.studies.accuracy.timed_run import comparison_times
 
 DATA = Path(__file__).with_name("data")

@@ -15,7 +15,7 @@ import numpy as np
 from quick import installed, parser, pick
 
 from msfp_gen import Motion, Scene, Top, TwoPort, presets
-from msfp_gen.fmu import write_fmu
+from msfp_gen.embedding.unit import write_fmu
 
 BEARING, LOAD = presets.bearing("fenz-tfp").replace(contact_damping=1e-4), 112e3
 STEP, COUNT, ROUNDS = 0.01, 200, pick(5, 1)

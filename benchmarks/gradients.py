@@ -22,7 +22,7 @@ from msfp_gen import Scene, load_scene
 from msfp_gen.generator.gradients import COLUMNS
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.parameters import parameters_of
-from msfp_gen.simulation.gradient_inputs import start_gradients
+from msfp_gen.simulation.gradients import start_gradients
 from msfp_gen.simulation.simulate import RunSequence
 
 REPEATS = pick(9, 1)

@@ -1,6 +1,6 @@
 """Fit the heat kernel 1/sqrt(t) by a sum of exponentials: `python benchmarks/heat_kernel.py`.
 
-Prints the table of `msfp_gen/specification/heat_kernel.py` and draws `docs/figures/heat-kernel.png`: the error of the sum, and a
+Prints the table of `msfp_gen/specification/friction_laws.py` and draws `docs/figures/heat-kernel.png`: the error of the sum, and a
 temperature computed by the sum and by the exact convolution.
 """
 
@@ -13,7 +13,7 @@ from drawing import COLOURS, drawn, panels
 from numpy.typing import NDArray
 from quick import docs_folder, parser
 
-from msfp_gen.specification.heat_kernel import HEAT_ERROR, HEAT_KERNEL, LONGEST, SHORTEST
+from msfp_gen.specification.friction_laws import HEAT_ERROR, HEAT_KERNEL, LONGEST, SHORTEST
 
 Array = NDArray[np.float64]
 FASTEST, SLOWEST = 6.0, 0.4  # rates of the first and last term, over 1/SHORTEST and 1/LONGEST

@@ -20,7 +20,7 @@ import kernels
 from quick import parser, pick
 
 from msfp_gen import Layout, Scene, load_scene
-from msfp_gen.embedding import export_library
+from msfp_gen.embedding.library import export_library
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 
 CALLS = pick(200, 2)

@@ -44,14 +44,12 @@ TESTS = pick(
         (f"{UNIT}/simulation",),
         (f"{UNIT}/buildings",),
         (f"{RUNS}/test_gradients.py", f"{RUNS}/test_gradients_free.py"),
-        (f"{UNIT}/coupling", f"{UNIT}/embedding/test_c_interface.py", f"{UNIT}/embedding/test_two_port_in_c.py"),
-        (f"{UNIT}/fmu",),
+        (f"{UNIT}/embedding",),
         (f"{RUNS}/test_uplift.py", f"{RUNS}/test_building_uplift.py", f"{RUNS}/test_buildings.py"),
         (f"{UNIT}/generator", f"{UNIT}/specification"),
         (f"{UNIT}/results", f"{UNIT}/model"),
         (f"{UNIT}/motions", f"{UNIT}/scene"),
         (f"{UNIT}/runtime/test_esdirk.py", f"{UNIT}/runtime/test_math.py"),
-        (f"{UNIT}/embedding/test_library.py",),
         (f"{RUNS}/test_loads.py",),
         (f"{UNIT}/studies/test_estimate.py",),
         (f"{RUNS}/test_quasistatic.py", f"{RUNS}/test_two_port.py", f"{RUNS}/test_vertical_compliance.py"),
@@ -62,7 +60,7 @@ TESTS = pick(
 # It asks that an interrupted run ends within 5 s, which one that writes counts does not on a busy machine.
 LEFT_OUT = f"{UNIT}/simulation/test_failures.py::test_interrupt_keeps_what_was_computed"
 
-# Physics: what decides the numbers of a run, from the equations to what is read off its rows. Row -> folders.
+# Physics: what decides the numbers of a run, from the equations to what is read off its rows. Row -> folders, files.
 PYTHON = {
     "generator": ("generator",),
     **{
@@ -75,10 +73,10 @@ PYTHON = {
             "simulation",
             "results",
             "analysis",
-            "coupling",
             "buildings",
         )
     },
+    "embedding, two ports": ("msfp_gen/embedding/two_port.py", "msfp_gen/embedding/server.py"),
 }
 C = {
     **{
@@ -89,7 +87,9 @@ C = {
     "buildings/compiled": ("msfp_gen/buildings/compiled",),
     "studies/estimation/compiled": ("msfp_gen/studies/estimation/compiled",),
 }
-INTERFACE = {"fmu/assets": ("msfp_gen/fmu/assets",)}  # the functions of the standard for units (FMU)
+INTERFACE = {
+    "embedding/assets/fmi": ("msfp_gen/embedding/assets/fmi",)
+}  # the functions of the standard for units (FMU)
 EMITTED = frozenset(path.name.removesuffix(".jinja") for path in (ROOT / "templates").glob("*.[ch].jinja"))
 
 # A compiler that counts lines. What gcov needs later, notes and sources, is kept in the folder into which libgcov writes
@@ -284,7 +284,7 @@ def sources(rows: Mapping[str, tuple[str, ...]], pattern: str) -> dict[str, str]
     found = {}
     for row, folders in rows.items():
         for folder in folders:
-            for path in sorted((ROOT / folder).glob(pattern)):
+            for path in sorted(ROOT.glob(folder if folder.endswith(pattern[1:]) else f"{folder}/{pattern}")):
                 found[path.relative_to(ROOT).as_posix()] = row
     return found
 
@@ -300,7 +300,7 @@ test fails and where a row of physics is below {least} %. It is not part of CI.
 ## What is counted
 
 *Physics* is what decides the numbers of a run, from the equations to what is read off its rows: in Python the packages
-of the first table, in C the hand-written runtime of every model, and the runs of buildings and of estimates. Commands,
+and files of the first table, in C the hand-written runtime of every model, and the runs of buildings and of estimates. Commands,
 figures, reports, studies and the build of models are not.
 
 The tests are a choice, {count} of the fast suite, so that the whole suite runs at least these lines. They are those of
@@ -318,7 +318,7 @@ counts where gcc makes code of it in any of the models that the tests build ({mo
 
 {c}
 
-The rows below *all* are not of physics. `fmu/assets` are the functions of a standard, many of which only refuse what a
+The rows below *all* are not of physics. `embedding/assets/fmi` are the functions of a standard, many of which only refuse what a
 bearing does not have ([fmu.md](fmu.md)). *Emitted* C, the kernels and drivers that the generator writes for each model, is
 counted as the sum over all models, of which many are built for one question, so it says little. What is emitted is
 compared with an independent reference at random states (`tests/physics/test_equations.py`), its derivatives with
@@ -462,7 +462,7 @@ def page(
 
 def low(text: str) -> list[str]:
     """Rows of physics on a page that are below the least share."""
-    found = re.findall(r"^\| `((?!fmu/)[\w/, ]+)` \| \d+ \| \d+ \| ([\d.]+) \|$", text, re.MULTILINE)
+    found = re.findall(r"^\| `((?!embedding/assets/)[\w/, ]+)` \| \d+ \| \d+ \| ([\d.]+) \|$", text, re.MULTILINE)
     return [f"{name}: {share} %" for name, share in found if float(share) < LEAST]
 
 

@@ -54,21 +54,18 @@ PARTS = {
 CHOSEN: dict[str, tuple[str, ...]] = {
     "generator/latex.py": ("tests/unit/generator",),
     "generator/interface.py": ("tests/unit/generator", "tests/unit/embedding/test_library.py"),
-    "generator/assembled.py": ("tests/unit/generator",),
-    "generator/hysteresis.py": (
+    "generator/laws.py": (
         EQUATIONS,
         "tests/physics/test_friction_laws.py",
         "tests/physics/test_hysteresis.py",
     ),
-    "msfp_gen/specification/heat_kernel.py": ("tests/physics/test_friction_laws.py",),
-    "generator/laws.py": ("tests/physics/test_friction_laws.py",),
+    "msfp_gen/specification/friction_laws.py": ("tests/physics/test_friction_laws.py",),
     "generator/seat.py": ("tests/physics/test_uplift.py",),
     "generator/top*.py": (EQUATIONS, "tests/physics/test_vertical_compliance.py"),
     "generator/gradients.py": ("tests/physics/test_gradients.py",),
     "generator/columns.py": (EQUATIONS, "tests/physics/test_gradients.py", "tests/physics/test_tangents.py"),
     "generator/schedule.py": (EQUATIONS, "tests/unit/generator"),
     "generator/drivers.py": (EQUATIONS, "tests/unit/generator", "tests/physics/test_gradients.py"),
-    "generator/declarations.py": ("tests/unit/embedding/test_library.py",),
     "generator/parameters.py": (EQUATIONS, "tests/physics/test_uplift.py", "tests/physics/test_gradients.py"),
     "*/runtime/equations/memory.c": ("tests/physics/test_friction_laws.py",),
     "*/runtime/equations/tangent_forward.c": ("tests/physics/test_uplift.py", "tests/physics/test_tangents.py"),
@@ -79,8 +76,8 @@ CHOSEN: dict[str, tuple[str, ...]] = {
     "*/runtime/run/monitors.c": ("tests/unit/simulation/test_auto.py", "tests/physics/test_friction_laws.py"),
     "*/runtime/run/*": (RUNS, "tests/hard/test_limits.py", "tests/hard/test_rims.py", "tests/hard/test_ladder.py"),
     "*/runtime/gradients/*": ("tests/physics/test_gradients.py", "tests/unit/simulation/test_gradients.py"),
-    "*/runtime/port/*": ("tests/unit/coupling/test_two_port.py", "tests/physics/test_two_port.py"),
-    "*/runtime/api/two_port.c": ("tests/unit/coupling/test_two_port.py", "tests/unit/embedding/test_two_port_in_c.py"),
+    "*/runtime/port/*": ("tests/unit/embedding/test_two_port.py", "tests/physics/test_two_port.py"),
+    "*/runtime/api/two_port.c": ("tests/unit/embedding/test_two_port.py", "tests/unit/embedding/test_two_port_in_c.py"),
     "*/runtime/api/*": ("tests/unit/test_python_users.py", "tests/unit/embedding/test_library.py"),
 }
 GOLDEN = "tests/unit/generator/test_golden.py"

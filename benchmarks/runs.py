@@ -17,8 +17,8 @@ from plain import plain_scene
 from quick import installed, parser, pick
 
 from msfp_gen import Effects, Scene, simulate
-from msfp_gen.result import Result
-from msfp_gen.studies.accuracy.models import run_opensees
+from msfp_gen.simulation.result import Result
+from msfp_gen.studies.accuracy.series import run_opensees
 
 Array = NDArray[np.float64]
 FULL = Effects()

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from msfp_gen.common.output import replacing
 from msfp_gen.common.tables import markdown_table
-from msfp_gen.generator.assembled import assembled_latex
 from msfp_gen.generator.derive import derive
-from msfp_gen.generator.latex import statements
+from msfp_gen.generator.latex import assembled_latex, statements
 from msfp_gen.generator.schedule import Decision, Over, Pass, condensed, momentum_balances, passes_of, two_port
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 

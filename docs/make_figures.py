@@ -15,9 +15,9 @@ import run_tutorial
 from msfp_gen import figures, load_scene, simulate, study
 from msfp_gen.figures import style
 from msfp_gen.motions.records import baseline_corrected, bundled, response_spectrum
-from msfp_gen.result import Result
 from msfp_gen.results.geometry import sections
 from msfp_gen.results.joining import at_times
+from msfp_gen.simulation.result import Result
 from msfp_gen.studies import fragility, ida, plot_fragility, plot_ida, read_study
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))

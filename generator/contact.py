@@ -11,12 +11,12 @@ from typing import Any
 import sympy as sp
 
 from msfp_gen.specification import friction_laws
-from msfp_gen.specification.spin import Spin
+from msfp_gen.specification.friction_laws import Spin
 
 from . import laws
 from .blocks import Blocks
 from .functions import ArcTan2, Modulus, Select
-from .hysteresis import Shear, friction_rates
+from .laws import Shear, friction_rates
 from .program import Program, Vector
 from .vectors import add, combine, cross, dot, project, scale
 

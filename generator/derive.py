@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from msfp_gen.specification.layout import ModelSpec
 
-from . import body, columns, contact, energy, laws, parameters, rotation, seat, slip, top, two_port
+from . import body, columns, contact, energy, laws, parameters, seat, top, two_port
 from .blocks import Blocks, make_blocks
 from .program import Program
 
@@ -82,13 +82,13 @@ def derive(spec: ModelSpec) -> Equations:
         top.top_energy(blocks),
         contact.gap(blocks),
         *energy.programs(blocks, effects.rims, effects.uplift, effects.top_rotation),
-        rotation.rotation_angles(blocks),
+        two_port.rotation_angles(blocks),
         *two_port.programs(blocks),
     ]
     if effects.top_rotation:
         programs.append(top.upright(blocks))
     if effects.permits_quasistatic_steps:
-        programs += [slip.slid_friction(blocks, effects.bouc_wen), slip.slip_work(blocks, effects.bouc_wen)]
+        programs += [laws.slid_friction(blocks, effects.bouc_wen), laws.slip_work(blocks, effects.bouc_wen)]
     if effects.rims:
         programs += [contact.rim_coordinates(blocks), contact.rim(blocks)]
     if effects.uplift:

@@ -8,19 +8,17 @@ from dataclasses import dataclass, fields
 
 import sympy as sp
 
-from msfp_gen.specification import contract, rows
-from msfp_gen.specification.heat_kernel import HEAT_KERNEL
+from msfp_gen.common.version import __version__
+from msfp_gen.specification import contract
+from msfp_gen.specification.friction_laws import HEAT_KERNEL
 from msfp_gen.specification.layout import ModelSpec
-from msfp_gen.version import __version__
 
-from .checks import checks_context
 from .derive import Equations
 from .drivers import schedule_context, scheduled_kernels
+from .functions import to_c
 from .gradients import COLUMNS, contact_lists
-from .header import environment, public_header, word_enums
-from .interface import interface_context, model_name
+from .interface import checks_context, environment, interface_context, model_name, public_header, word_enums
 from .lower import Kernel, jacobian_column, ordered_active_inputs
-from .printer import to_c
 from .program import Block, Use
 
 # Each is made from the template of its name.
@@ -186,14 +184,14 @@ def scalar_quantities(block: Block) -> list[tuple[str, int | None, str]]:
     ]
 
 
-def shape_of(spec: ModelSpec) -> Callable[[rows.Quantity], tuple[int, ...]]:
+def shape_of(spec: ModelSpec) -> Callable[[contract.Recorded], tuple[int, ...]]:
     """Shapes of the fields of a row in numbers, for the wrapper."""
     lengths = {
-        rows.Extent.SURFACES: spec.layout.surfaces,
-        rows.Extent.COORDINATES: 6 if spec.effects.uplift else 3,
-        rows.Extent.WORKS: len(contract.WORKS),
+        contract.Extent.SURFACES: spec.layout.surfaces,
+        contract.Extent.COORDINATES: 6 if spec.effects.uplift else 3,
+        contract.Extent.WORKS: len(contract.WORKS),
     }
-    return lambda quantity: tuple(lengths[n] if isinstance(n, rows.Extent) else n for n in quantity.shape)
+    return lambda quantity: tuple(lengths[n] if isinstance(n, contract.Extent) else n for n in quantity.shape)
 
 
 def lanes(surfaces: int) -> int:
@@ -210,8 +208,8 @@ def description(spec: ModelSpec) -> str:
             "layout": (spec.layout.n, spec.layout.m, spec.layout.p),
             "effects": {f.name: getattr(spec.effects, f.name) for f in fields(spec.effects)},
             "surface_values": contract.surface_values(spec.effects),
-            "row": [(q.name, shape(q)) for q in rows.row(spec.effects)],
-            "extremes": [(q.name, shape(q)) for q in rows.extremes(spec.effects)],
+            "row": [(q.name, shape(q)) for q in contract.row(spec.effects)],
+            "extremes": [(q.name, shape(q)) for q in contract.extremes(spec.effects)],
         }
     )
 
@@ -255,8 +253,8 @@ def emit(
         "flows": spec.effects.permits_quasistatic_steps,
         "heat": HEAT_KERNEL,
         "words": word_enums(),
-        "row": rows.row(spec.effects),
-        "extremes": rows.extremes(spec.effects),
+        "row": contract.row(spec.effects),
+        "extremes": contract.extremes(spec.effects),
         "columns": {"body": contract.names(contract.BODY), "top": contract.names(contract.TOP)},
         "names": {kind: tuple(name for name, *_ in entries) for kind, *_, entries in word_enums()},
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),

@@ -1,21 +1,30 @@
-"""What the public C interface states about a model: its name, its external names, its lists of numbers, its texts."""
+"""The public C interface: its header, and what it states about a model: names, lists of numbers, texts and checks.
+
+The header is the only description of its types and functions: its text is read to declare them in Cython and Fortran.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
 from importlib import resources
+from math import inf
 from typing import TYPE_CHECKING, Any
 
-from msfp_gen.specification import contract, rows
+from msfp_gen.common.version import __version__
+from msfp_gen.specification import contract
+from msfp_gen.specification.friction_laws import HEAT_KERNEL, LONGEST
 from msfp_gen.specification.values import Value
-
-from . import declarations
 
 if TYPE_CHECKING:
     from importlib.abc import Traversable  # in Python 3.14 importlib.resources.abc alone
 
+    from jinja2 import Environment
+
     from msfp_gen.specification.layout import ModelSpec
+    from msfp_gen.specification.values import Bound
 
 ABI_VERSION = 2
 CALL_ERRORS = (  # what calls return beside the statuses of a run: name, meaning and remedy
@@ -71,7 +80,7 @@ def text_in_c(status: contract.Status) -> str:
 def interface_context(spec: ModelSpec, shape: Any, header: str) -> dict[str, Any]:
     """What the templates of the public interface need; shape: of a quantity, in numbers; header: text of `msfp.h`."""
     symbols = runtime_symbols()
-    lists = {"row": rows.row(spec.effects), "extremes": rows.extremes(spec.effects)}
+    lists = {"row": contract.row(spec.effects), "extremes": contract.extremes(spec.effects)}
     meanings = {"row": "One row of output", "extremes": "Extremes of a run over all of its accepted steps"}
     values = {
         "body": ("Values of a body in order; the base comes first", contract.BODY),
@@ -84,7 +93,7 @@ def interface_context(spec: ModelSpec, shape: Any, header: str) -> dict[str, Any
         "errors": CALL_ERRORS,
         "symbols": symbols,
         "api_functions": list(_api_functions(spec, set(symbols), header)),
-        "cython_declarations": declarations.cython(header),
+        "cython_declarations": cython(header),
         "effects_text": effects_text(spec),
         "coordinates": 6 if spec.effects.uplift else 3,
         "value_lists": [(kind, text, entries) for kind, (text, entries) in values.items()],
@@ -95,7 +104,7 @@ def interface_context(spec: ModelSpec, shape: Any, header: str) -> dict[str, Any
 
 def _api_functions(spec: ModelSpec, symbols: set[str], header: str) -> Iterator[tuple[str, str]]:
     """The functions of the table of a model and those of the runtime behind them; of gradients where it has them."""
-    for name in declarations.functions(header):
+    for name in functions(header):
         own = [symbol for symbol in (f"msfp_api_{name}", f"msfp_{name}") if symbol in symbols]
         if own and (spec.gradients or not name.startswith("gradient")):
             yield name, own[0]
@@ -112,3 +121,234 @@ def _files(folder: Traversable, suffix: str) -> Iterator[Traversable]:
             yield from _files(entry, suffix)
         elif entry.name.endswith(suffix):
             yield entry
+
+
+_IN_C = {"pi": "MSFP_PI", "asin": "msfp_asin"}  # words of a limit that are no values
+
+
+def checks_context(spec: ModelSpec) -> dict[str, Any]:
+    """What the template of the checks needs."""
+    surface = surface_values(spec)
+    words = _IN_C | {
+        value.name: f"{kind}[{_index(kind, value)}]"
+        for kind, values in (("body", contract.BODY), ("surface", surface))
+        for value in values
+    }
+    return {
+        "largest_friction_state": repr(contract.LARGEST_FRICTION_STATE),
+        "longest_heating": repr(LONGEST),
+        "max_rows": repr(contract.MAX_ROWS),
+        "ranges": {
+            "body": [_range(value, "bodies: ", _index("body", value)) for value in contract.BODY],
+            "surface": [_range(value, "surfaces: ", _index("surface", value)) for value in surface],
+            "top": [_range(value, "top: ", _index("top", value)) for value in contract.TOP],
+            "top_mass": [_range(value, "top: ", _index("top", value)) for value in contract.TOP_MASS],
+            "interface": [_range(value, "bearing: top: ", _index("top", value)) for value in contract.INTERFACE],
+            "gravity": [_range(contract.GRAVITY)],
+            "axial_load": [_range(contract.AXIAL_LOAD)],
+            "scene": [_range(value, at=_place(value)) for value in contract.RUN],
+        },
+        "arrays": [(*_range(value, at=_place(value)), value.count, int(value.default)) for value in contract.ARRAYS],
+        "bounds": {
+            "body": list(_bounds(contract.BODY_BOUNDS, "bodies", words)),
+            "surface": list(_bounds(contract.SURFACE_BOUNDS, "surfaces", words)),
+        },
+    }
+
+
+def _index(kind: str, value: Value) -> str:
+    return f"MSFP_{kind}_VALUES_{value.name}".upper()
+
+
+def _place(value: Value) -> str:
+    return f"offsetof(msfp_scene, {value.name})"
+
+
+def _range(value: Value, of: str = "", at: str = "0") -> tuple[str, str, str, int, int, str]:
+    """Where it is, the least and the largest number, whether 0 is one too, whether the base has none, the message."""
+    rule, (least, most) = value.rule, value.rule.limits
+    if rule.computed:  # any that is as large as that
+        least, most = (-inf if least < 0 else least), inf
+    message = f"{of}{value.name.partition('[')[0]}: {rule.remedy_with_limits}"
+    message += f"; 0: {value.zero}" if value.zero else ""
+    return at, _number(least), _number(most), int(bool(value.zero)), int(not value.base), message
+
+
+def _number(x: float) -> str:
+    return repr(x).replace("inf", "INFINITY")
+
+
+def _bounds(bounds: Iterable[Bound], of: str, words: Mapping[str, str]) -> Iterable[tuple[str, str]]:
+    """Condition and message of each."""
+    for bound in bounds:
+        limit = re.sub(r"[a-z]\w*", lambda word: words[word[0]], bound.limit)
+        sign = "<" if bound.open else "<="
+        yield f"{words[bound.name]} {sign} {limit}", f"{of}: {bound.name}: {bound.remedy}"
+
+
+def word_enums() -> list[tuple[str, str, str, str, list[tuple[str, str, str]]]]:
+    """Enumerations whose names Python knows: type, prefix, meaning, count, (name, enumerator, meaning)."""
+    statuses = tuple(status for status in contract.STATUSES if status.compiled)
+    plain = {"ok": "MSFP_OK", "stopped": "MSFP_STOPPED"}
+    return [
+        (
+            kind,
+            prefix,
+            meaning,
+            last,
+            [(e.name, plain.get(e.name, prefix + e.name.upper()), e.meaning) for e in entries],
+        )
+        for kind, prefix, meaning, last, entries in (
+            ("status", "MSFP_E_", "How a run or an evaluation ended", "MSFP_STATUSES", statuses),
+            ("integral", "MSFP_WORK_", "Integrals over a run [J]", "MSFP_WORKS", contract.WORKS),
+            ("event_kind", "MSFP_EVENT_", "Kinds of events", "MSFP_EVENT_KINDS", contract.EVENT_KINDS),
+            ("count", "MSFP_COUNT_", "Counters of a run", "MSFP_COUNTS", contract.COUNTERS),
+            ("method", "MSFP_METHOD_", "Methods of integration", "MSFP_METHODS", contract.METHODS),
+            ("monitor", "MSFP_MONITOR_", "Monitors of what a model leaves out", "MSFP_MONITORS", contract.MONITORS),
+        )
+    ]
+
+
+@cache
+def environment() -> Environment:
+    """Templates of the package, in which an undefined name is an error."""
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    folder = resources.files("msfp_gen.templates")
+    return Environment(
+        loader=FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+
+
+@cache
+def public_header() -> str:
+    """Text of `msfp.h`, the same for every model."""
+    context = {
+        "version": __version__,
+        "words": word_enums(),
+        "abi": ABI_VERSION,
+        "errors": CALL_ERRORS,
+        "heat": HEAT_KERNEL,
+    }
+    return environment().get_template("msfp.h.jinja").render(context, file="msfp.h")
+
+
+_STRUCT = re.compile(r"typedef struct(?: \w+)? \{(.*?)\} (\w+);", re.DOTALL)
+_OPAQUE = re.compile(r"typedef struct (\w+) \1;")
+_CALLBACK = re.compile(r"typedef (\w+) \(\*(\w+)\)\((.*?)\);")
+_CONSTANT = re.compile(r"#define (\w+) (\d+)")
+_FUNCTION = re.compile(r"(.+?)\(\*(\w+)\)\((.*)\)")
+_ENTRY = re.compile(r"(\**)(\w+)((?:\[\w+\])*)")
+_FORTRAN = {"int": "integer(c_int)", "double": "real(c_double)", "size_t": "integer(c_size_t)"}
+_ZEROS = {"integer(c_int)": "0", "real(c_double)": "0.0_c_double", "integer(c_size_t)": "0"}
+
+
+@dataclass(frozen=True)
+class Member:
+    """One member of a struct.
+
+    Attributes:
+        name: name.
+        type: C of its type without pointers and dimensions; of a function that of its result, pointers included.
+        pointer: whether it is a pointer to data.
+        dimensions: of an array, as in C.
+        parameters: C of the parameters of a function; None: no function.
+    """
+
+    name: str
+    type: str
+    pointer: bool = False
+    dimensions: tuple[str, ...] = ()
+    parameters: str | None = None
+
+
+@dataclass(frozen=True)
+class Struct:
+    """A struct of the header with its members in order."""
+
+    name: str
+    members: tuple[Member, ...]
+
+
+def _without_comments(text: str) -> str:
+    return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+
+
+def _members(body: str) -> Iterator[Member]:
+    for statement in (" ".join(part.split()) for part in body.split(";")):
+        if not statement:
+            continue
+        if function := _FUNCTION.fullmatch(statement):
+            yield Member(function[2], function[1].strip(), parameters=function[3])
+            continue
+        kind, entries = re.fullmatch(r"((?:const )?\w+) (.+)", statement).groups()  # type: ignore[union-attr]
+        for entry in entries.split(", "):
+            stars, name, dimensions = _ENTRY.fullmatch(entry).groups()  # type: ignore[union-attr]
+            yield Member(name, kind, bool(stars), tuple(re.findall(r"\w+", dimensions)))
+
+
+def structs(header: str) -> list[Struct]:
+    """The structs of the text of `msfp.h`, in order."""
+    return [Struct(name, tuple(_members(body))) for body, name in _STRUCT.findall(_without_comments(header))]
+
+
+def functions(header: str) -> list[str]:
+    """Names of the functions of the table `msfp_api`, in order."""
+    (table,) = (struct for struct in structs(header) if struct.name == "msfp_api")
+    return [member.name for member in table.members if member.parameters is not None]
+
+
+def cython(header: str) -> list[str]:
+    """Declarations for the body of a `cdef extern`; every array has a length that Cython knows as an enumerator."""
+    code = _without_comments(header)
+    every = structs(header)
+    lengths = dict.fromkeys(n for s in every for m in s.members for n in m.dimensions if not n.isdigit())
+    lines = [f"enum: {name}" for name in lengths]
+    for name in _OPAQUE.findall(code):
+        lines += [f"ctypedef struct {name}:", "    pass"]
+    at = {match[2]: match.start() for match in _STRUCT.finditer(code)}
+    callbacks = {match.start(): match for match in _CALLBACK.finditer(code)}
+    for struct in every:
+        for start in [start for start in callbacks if start < at[struct.name]]:
+            match = callbacks.pop(start)
+            lines.append(f"ctypedef {match[1]} (*{match[2]})({match[3]}) noexcept nogil")
+        lines.append(f"ctypedef struct {struct.name}:")
+        lines += [f"    {_cython_member(member)}" for member in struct.members]
+    return lines
+
+
+def _cython_member(member: Member) -> str:
+    if member.parameters is not None:
+        return f"{member.type} (*{member.name})({member.parameters}) noexcept nogil"
+    dimensions = "".join(f"[{n}]" for n in member.dimensions)
+    return f"{member.type} {'*' * member.pointer}{member.name}{dimensions}"
+
+
+def fortran(header: str) -> list[str]:
+    """Derived types that are interoperable with the structs. What is given to C, with pointers, is null and zero."""
+    known = dict(_CONSTANT.findall(header))
+    lines: list[str] = []
+    for struct in structs(header):
+        lines += ["", f"type, bind(c) :: {struct.name}"]
+        has_defaults = any(member.pointer for member in struct.members)
+        lines += [f"   {_fortran_member(member, known, has_defaults)}" for member in struct.members]
+        lines.append("end type")
+    return lines
+
+
+def _fortran_member(member: Member, lengths: dict[str, str], has_defaults: bool) -> str:
+    if member.parameters is not None:
+        return f"type(c_funptr) :: {member.name} = c_null_funptr"
+    if member.pointer:
+        return f"type(c_ptr) :: {member.name} = c_null_ptr"
+    kind = _FORTRAN.get(member.type)
+    if kind is None:
+        return f"type({member.type}) :: {member.name}"
+    sizes = ", ".join(lengths.get(n, n) for n in reversed(member.dimensions))
+    default = f" = {_ZEROS[kind]}" if has_defaults else ""
+    return f"{kind} :: {member.name}{f'({sizes})' if sizes else ''}{default}"

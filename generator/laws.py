@@ -1,28 +1,174 @@
-"""Friction laws: the fields that a law adds to the blocks, and the statements that it adds to the contact programs.
+"""Friction: the coefficient by a friction law, and the state by a hysteresis law, its rates and a closed form.
 
-With a law, the friction coefficient mu is a local unknown of the contact, besides Y and Z: it depends on normal force,
+With a friction law, the coefficient mu is a local unknown of the contact, besides Y and Z: it depends on normal force,
 slip and what the surface remembers, such as its temperature, which depend on mu in turn. The program `contact`
 therefore has one more equation to solve. In `report_contact` psi~, theta~ and N are given, and mu follows directly. A
-model of constant friction uses none of this.
+model of constant friction uses none of this. A law adds fields to blocks and statements to the contact programs.
+
+Hysteresis is Bouc-Wen (3.18) or elastic-perfectly plastic. The closed form over a slip is for planar models without
+masses (docs/effects.md). s is the slip over d_y. By (3.18) dY/ds = 1 - Y^2 while friction opposes the slip, so Y is a
+hyperbolic tangent of s; while friction unloads, dY/ds = 1. By the plastic law Y is Y + s, between -1 and 1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import sympy as sp
 
 from msfp_gen.specification.formula import Operations, fold
-from msfp_gen.specification.friction_laws import Law, Memory
-from msfp_gen.specification.spin import Spin
+from msfp_gen.specification.friction_laws import HYSTERESIS, Law, Memory, Spin, is_plastic
 
 from .blocks import Blocks
-from .functions import Modulus, Step
+from .functions import Clamp, Decay, Modulus, Select, Step
 from .program import Block, Field, Program
 
 Symbols = dict[str, Any]
+ON_THE_EDGE = sp.Float("1e-9")
+"""A friction state is on the edge of the unit disc if 1 less its square is at most this."""
+
+
+@dataclass(frozen=True)
+class Shear:
+    """Friction state of a contact, and the data from which its rates follow.
+
+    Attributes:
+        Y, Z: friction state.
+        before: Y and Z that the earlier stages of a step give.
+        tau: sum of the diagonal entry of the stage formula and the damping time T; T outside of a step [s].
+        kept: derivative of the friction state with respect to the friction force over -mu N.
+    """
+
+    Y: sp.Expr
+    Z: sp.Expr
+    before: tuple[sp.Expr, sp.Expr]
+    tau: sp.Expr
+    kept: sp.Expr
+
+
+def friction_rates(p: Program, law: str, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:
+    """dY/dt and dZ/dt of a hysteresis law at the slip velocity u, v; `dy` is the yield displacement.
+
+    YY, YZ, ZY, ZZ are their derivatives with respect to Y and Z at constant slip velocity. An implicit stage solves for
+    Y and Z with them. `plastic` is the velocity of plastic slip; `plastic_Y`, `plastic_Z` are its derivatives.
+    """
+    return (plastic_rates if is_plastic(law) else partial(bouc_wen_rates, law))(p, shear, u, v, dy)
+
+
+def bouc_wen_rates(law: str, p: Program, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:
+    """dY/dt and dZ/dt (3.18) with 1/d_y for R/R_0, and the switches of the hysteresis law.
+
+    The plastic slip is that of the isotropic law for every law, Y^2 + Z^2 times Y u + Z v where the latter is positive:
+    it is zero where friction unloads elastically and equals the slip velocity in steady sliding. The magnitude of the
+    slip velocity is not used: a friction coefficient that increases with it would increase friction during elastic
+    unloading, where friction acts along the slip and does work on the sliders, so that light sliders accelerate without
+    bound. The plastic part by the switches per axis has the same defect across the slip.
+    """
+    Y, Z = shear.Y, shear.Z
+    yu, zv = p.let(Y * u), p.let(Z * v)
+    switches = HYSTERESIS[law].switches
+    assert switches is not None
+    a, b = switches(yu, zv, lambda x: p.let(Step(p.let(x))))
+    drive, au, bv = p.let(a * yu + b * zv), p.let(a * u), p.let(b * v)
+    square, along = p.let(Y**2 + Z**2), p.let(yu + zv)
+    positive = p.let(Step(along))
+    return {
+        "dY": p.let((u - Y * drive) / dy, "dY"),
+        "dZ": p.let((v - Z * drive) / dy, "dZ"),
+        "YY": -(drive + Y * au) / dy,
+        "YZ": -Y * bv / dy,
+        "ZY": -Z * au / dy,
+        "ZZ": -(drive + Z * bv) / dy if Z != 0 else Z,
+        "plastic": p.let(square * along * positive),
+        "plastic_Y": positive * (2 * Y * along + square * u),
+        "plastic_Z": positive * (2 * Z * along + square * v),
+    }
+
+
+def plastic_rates(p: Program, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:
+    """dY/dt and dZ/dt of the elastic-perfectly plastic law by radial return; keys as of `friction_rates`.
+
+    The friction force over -mu N, g = (Y, Z) + T d(Y, Z)/dt, is bounded by 1: g is the projection onto the unit disc of
+    `before` + tau (u, v)/d_y, the force of an elastic slip, and d(Y, Z)/dt = (g - before)/tau. With tau = 0 it is the
+    limit: elastic inside the disc, and without the outward component on its edge.
+    """
+    zero, before = sp.Integer(0), shear.before
+    trial = tuple(p.let(f + shear.tau * w / dy) for f, w in zip(before, (u, v), strict=True))
+    square = p.let(trial[0] ** 2 + trial[1] ** 2)
+    root = p.let(sp.sqrt(p.let(1 + Step(p.let(square - 1)) * (square - 1))))
+    along = p.let(before[0] * u + before[1] * v)
+    timed = p.let(Step(shear.tau))
+    returned, limit = p.let(timed * dy / (shear.tau + 1 - timed)), p.let(1 - timed)
+    outward = p.let(limit * Step(p.let(square - 1 + ON_THE_EDGE)) * Step(along))
+    slipping = p.let(returned * (root - 1) + outward * along, "slipping")
+    return {
+        "dY": p.let((u - p.let(trial[0] / root) * slipping) / dy, "dY"),
+        "dZ": p.let((v - p.let(trial[1] / root) * slipping) / dy, "dZ"),
+        **dict.fromkeys(("YY", "YZ", "ZY", "ZZ", "plastic_Y", "plastic_Z"), zero),
+        "plastic": slipping,
+    }
+
+
+def _after_slip(p: Program, plastic: bool, Y: sp.Expr, slip: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+    """Y after a slip, and the work that friction dissipates over it, over mu N d_y.
+
+    The work is the integral of Y^3 ds while friction opposes the slip; by the plastic law it is the slip beyond the
+    edge. Along the slip the state is y. Where no slip is left after unloading, the exponential is not used: Y stays
+    exact, and its slope is 1 also at rest.
+    """
+    if plastic:
+        trial = p.let(Y + slip)
+        end = p.let(Clamp(trial))
+        beyond = p.let(trial - end)
+        return end, beyond * (Step(beyond) - Step(-beyond))
+    direction = p.let(1 - 2 * Step(-slip))
+    y, rest = p.let(direction * Y), p.let(direction * slip)
+    unloading = p.let(y * Step(-y))  # of y; then friction unloads until it is zero
+    start, left = p.let(y - unloading), p.let(rest + unloading)
+    above = p.let(1 + start)
+    below = p.let((1 - start) * p.let(Decay(p.let(2 * left))))  # 0 at y = 1: saturated friction stays so
+    total = p.let(above + below)
+    end = p.let(Select(left, p.let((above - below) / total), p.let(y + rest)))
+    growth = p.let(left + p.let(Select(left, sp.log(total / 2), 0)))
+    lost = p.let(growth - p.let(end**2 - start**2) / 2)
+    return p.let(direction * end), Select(left, lost, 0)
+
+
+def slid_friction(b: Blocks, law: str) -> Program:
+    """Friction at the end of a step: Y, and the force over -mu N, Y + T dY/dt, of the sheared contact."""
+    p = Program("slid_friction", "friction after the slip of a step, (3.18) integrated in closed form")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    step: Symbols = p.read(b.slip, "s", active=False)
+    local: Symbols = p.read(b.contact_frame, "loc", active=("dw",))
+    per_turn = p.let(-par["sign"] * par["R"] / par["dy"])  # (3.19); in the plane the contact position does not enter
+    rate = p.let(per_turn * local["dw"][1])
+    Y, _ = _after_slip(p, is_plastic(law), step["Y"], p.let(step["beta"] * rate + per_turn * step["turn"]))
+    sheared = p.let(par["td"] * rate)
+    if is_plastic(law):
+        g = Clamp(p.let(Y + sheared))
+    else:
+        g = Y + sheared * p.let(1 - Step(p.let(Y * rate)) * p.let(Y**2))  # (3.18)
+    p.write(b.slid, {"Y": Y, "g": g}, columns="1")
+    return p
+
+
+def slip_work(b: Blocks, law: str) -> Program:
+    """Work of friction over a step, with the mean normal force."""
+    p = Program("slip_work", "work that friction stores and dissipates over the slip of a step")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    step: Symbols = p.read(b.slip, "s", active=False)
+    end: Symbols = p.read(b.slip_end, "e", active=False)
+    per_turn = p.let(-par["sign"] * par["R"] / par["dy"])
+    _, lost = _after_slip(p, is_plastic(law), step["Y"], p.let(per_turn * step["turn"]))
+    size = p.let(p.let(end["N"] * par["mu"]) * par["dy"])
+    stored = p.let(end["Y"] ** 2 - step["Y"] ** 2) / 2
+    p.write(b.slip_work, {"stored": size * stored, "lost": size * p.let(lost)}, tangents=False)
+    return p
+
+
 COVER_TRANSITION = sp.Rational(1, 10)
 """Half-width of the transition, in (x/reach)^2 about 1, over which the patch uncovers the centre of the surface: x is
 within 5 % of `reach`."""

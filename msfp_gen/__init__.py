@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from msfp_gen.version import __version__
+from msfp_gen.common.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.analysis.any_result import characterise as characterise
@@ -20,26 +20,26 @@ if TYPE_CHECKING:
     from msfp_gen.buildings.storey import BaseSlab as BaseSlab
     from msfp_gen.buildings.storey import Soil as Soil
     from msfp_gen.buildings.storey import Storey as Storey
-    from msfp_gen.coupling.two_port import TwoPort as TwoPort
-    from msfp_gen.errors import CompileError as CompileError
-    from msfp_gen.errors import InputError as InputError
-    from msfp_gen.errors import MsfpError as MsfpError
-    from msfp_gen.errors import RunError as RunError
+    from msfp_gen.common.errors import CompileError as CompileError
+    from msfp_gen.common.errors import InputError as InputError
+    from msfp_gen.common.errors import MsfpError as MsfpError
+    from msfp_gen.common.errors import RunError as RunError
+    from msfp_gen.embedding.two_port import TwoPort as TwoPort
     from msfp_gen.model.model import build_model as build_model
     from msfp_gen.motions.motion import Motion as Motion
     from msfp_gen.motions.prescribed import Load as Load
     from msfp_gen.motions.prescribed import Rotation as Rotation
-    from msfp_gen.result import Result as Result
     from msfp_gen.scene.bearing import Bearing as Bearing
     from msfp_gen.scene.bearing import Body as Body
     from msfp_gen.scene.bearing import Surface as Surface
     from msfp_gen.scene.file import presets as presets
-    from msfp_gen.scene.limits import Limits as Limits
     from msfp_gen.scene.scene import Scene as Scene
     from msfp_gen.scene.scene_fields import InitialState as InitialState
+    from msfp_gen.scene.scene_fields import Limits as Limits
     from msfp_gen.scene.scene_fields import Stop as Stop
     from msfp_gen.scene.solver import Solver as Solver
     from msfp_gen.scene.top import Top as Top
+    from msfp_gen.simulation.result import Result as Result
     from msfp_gen.simulation.simulate import simulate as simulate
     from msfp_gen.specification.layout import Auto as Auto
     from msfp_gen.specification.layout import Effects as Effects
@@ -59,19 +59,19 @@ _MODULES = {
     "Building": "buildings.building",
     "BuildingBearing": "buildings.scene",
     "BuildingScene": "buildings.scene",
-    "CompileError": "errors",
+    "CompileError": "common.errors",
     "Effects": "specification.layout",
     "InitialState": "scene.scene_fields",
-    "InputError": "errors",
+    "InputError": "common.errors",
     "Layout": "specification.layout",
-    "Limits": "scene.limits",
+    "Limits": "scene.scene_fields",
     "Load": "motions.prescribed",
     "Measurement": "studies.calibration",
     "Motion": "motions.motion",
-    "MsfpError": "errors",
-    "Result": "result",
+    "MsfpError": "common.errors",
+    "Result": "simulation.result",
     "Rotation": "motions.prescribed",
-    "RunError": "errors",
+    "RunError": "common.errors",
     "Scene": "scene.scene",
     "Soil": "buildings.storey",
     "Solver": "scene.solver",
@@ -79,7 +79,7 @@ _MODULES = {
     "Storey": "buildings.storey",
     "Surface": "scene.bearing",
     "Top": "scene.top",
-    "TwoPort": "coupling.two_port",
+    "TwoPort": "embedding.two_port",
     "bound": "studies.bounding",
     "build_model": "model.model",
     "changed_scene": "buildings.file",

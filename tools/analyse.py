@@ -21,9 +21,9 @@ from typing import NamedTuple
 
 from msfp_gen import Effects, Layout, Top, load_scene
 from msfp_gen.common.cores import usable_cores
-from msfp_gen.fmu import write_fmu
+from msfp_gen.embedding.unit import write_fmu
 from msfp_gen.generator import generate
-from msfp_gen.jit import driver
+from msfp_gen.jit import build
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.specification.layout import ModelSpec
 
@@ -74,10 +74,8 @@ class Task(NamedTuple):
 def emit() -> dict[Path, list[str]]:
     """Write all sources; returns folder -> C files to analyse there."""
     shutil.rmtree(FOLDER, ignore_errors=True)
-    sources = {
-        name: driver.sources(ROOT.joinpath(*package.split("."), "compiled")) for name, package in DRIVERS.items()
-    }
-    sources = {name: {**files, **driver.headers()} for name, files in sources.items()}
+    sources = {name: build.sources(ROOT.joinpath(*package.split("."), "compiled")) for name, package in DRIVERS.items()}
+    sources = {name: {**files, **build.headers()} for name, files in sources.items()}
     if not QUICK:
         for name, spec in MODELS.items():
             sources[name] = {**runtime_sources(spec.gradients), **generate(spec).files}

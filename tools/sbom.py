@@ -24,7 +24,7 @@ from quick import QUICK, parser
 
 ROOT = Path(__file__).resolve().parents[1]
 THREE = ROOT / "msfp_gen" / "report" / "assets" / "three.min.js"
-FMI = ROOT / "msfp_gen" / "fmu" / "assets" / "standard"
+FMI = ROOT / "msfp_gen" / "embedding" / "assets" / "fmi" / "standard"
 
 
 def packages(environment: Path) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 from sphinx.highlighting import lexers
 
-from msfp_gen.version import __version__
+from msfp_gen.common.version import __version__
 
 project = "msfp-gen"
 author = "The msfp-gen developers"

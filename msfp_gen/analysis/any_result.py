@@ -15,8 +15,8 @@ from msfp_gen.analysis.characterise import characterise as characterise_bearing
 from msfp_gen.analysis.summary import rows_of_bearing, surface_table, transition_table
 from msfp_gen.analysis.verdict import Verdict, verdict_of
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.errors import InputError
 from msfp_gen.results.files import ResultFiles
 from msfp_gen.results.note import by_importance
 from msfp_gen.results.run_data import BearingData

@@ -14,7 +14,7 @@ from msfp_gen.common.tables import Table
 from msfp_gen.results.run_data import BearingData
 from msfp_gen.results.sliding import open_times
 from msfp_gen.scene.friction_parameters import start_temperatures
-from msfp_gen.scene.limits import Limits
+from msfp_gen.scene.scene_fields import Limits
 
 if TYPE_CHECKING:
     from msfp_gen.common.arrays import Array

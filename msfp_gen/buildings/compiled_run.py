@@ -16,9 +16,9 @@ from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.cores import usable_cores
-from msfp_gen.coupling.two_port import DISSIPATED, compiled_port, scene_at_rest
-from msfp_gen.errors import InputError
-from msfp_gen.jit.driver import load_driver
+from msfp_gen.common.errors import InputError
+from msfp_gen.embedding.two_port import DISSIPATED, compiled_port, scene_at_rest
+from msfp_gen.jit.build import load_driver
 from msfp_gen.model.compiled import AnyRun, Port
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.motions.motion import Motion

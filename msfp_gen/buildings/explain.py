@@ -21,8 +21,8 @@ from msfp_gen.scene.effect_selection import (
     scene_doubts,
 )
 from msfp_gen.scene.friction_parameters import law_parameters
-from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.scene_fields import Limits
 from msfp_gen.scene.standing import unsteady
 from msfp_gen.specification.layout import Effects
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.buildings.building import Building
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.scene.fidelity import LEVEL, LOOSE, equivalent_pendulum, implicit_solver, labelled
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import Top

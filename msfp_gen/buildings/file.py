@@ -13,10 +13,10 @@ from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.fidelity import building_at_fidelity
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
 from msfp_gen.buildings.storey import BaseSlab, Soil, Storey
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, errors_at
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Kept, digest_of, expecting
-from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.fidelity import at_fidelity

@@ -17,8 +17,8 @@ from msfp_gen.buildings.notes import notes_of
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.summary import BuildingCharacterisation
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.errors import InputError
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import KINDS, Storage
 from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Event

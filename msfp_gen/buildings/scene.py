@@ -12,18 +12,16 @@ import numpy as np
 from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.storey import Node
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
 from msfp_gen.common.identity import NO_NUMBERS
-from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
 from msfp_gen.scene.friction_parameters import select_friction
-from msfp_gen.scene.limits import Limits
-from msfp_gen.scene.scene_fields import Fidelity
-from msfp_gen.scene.seats import check_seats
+from msfp_gen.scene.scene_fields import Fidelity, Limits
 from msfp_gen.scene.solver import Solver
-from msfp_gen.scene.standing import check_standing, needed_rotational_stiffness
+from msfp_gen.scene.standing import check_seats, check_standing, needed_rotational_stiffness
 from msfp_gen.scene.top import NodeTop
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 

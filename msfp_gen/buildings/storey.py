@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, check_fields, require_type
-from msfp_gen.errors import InputError
 from msfp_gen.scene.top import NodeTop
 
 HIGHEST = 1000.0  # storey [m]

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from msfp_gen.analysis.characterise import Characterisation
-from msfp_gen.analysis.characterise.loops import Path, rests
-from msfp_gen.analysis.characterise.report import characterised, effective_period
+from msfp_gen.analysis.characterise import Characterisation, characterised, effective_period
+from msfp_gen.analysis.loops import ForcePath, rests
 from msfp_gen.analysis.summary import summary_of_run
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.results.extremes import by_axis
@@ -273,7 +272,7 @@ class BuildingCharacterisation(Characterisation):
     def of(cls, result: Any) -> BuildingCharacterisation:
         """Characterise the run of a `BuildingResult`. Raises InputError where the bearings did not move."""
         mean, summary = np.mean([one.history.displacement for one in result.bearings], axis=0), result.summary
-        path = Path.of(result.time, mean, result.base_reaction, "the building")
+        path = ForcePath.of(result.time, mean, result.base_reaction, "the building")
         peaks = (float(result.extremes.mean_displacement[3]), summary["peak_force"]["radial"])
         load, gravity = result.scene.weight, result.scene.gravity
         system = characterised(

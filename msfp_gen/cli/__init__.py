@@ -10,18 +10,15 @@ import typer
 from msfp_gen.cli import (
     assessment_commands,
     batch_commands,
-    bench_commands,
-    export_commands,
     figure_commands,
     model_commands,
     record_commands,
     run_commands,
     study_commands,
 )
-from msfp_gen.cli.console import fail, say
-from msfp_gen.cli.interrupts import signals_as_interrupts
-from msfp_gen.errors import MsfpError
-from msfp_gen.version import __version__
+from msfp_gen.cli.console import fail, say, signals_as_interrupts
+from msfp_gen.common.errors import MsfpError
+from msfp_gen.common.version import __version__
 
 FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 # Base class of usage errors: ClickException, of click or of the copy of click inside newer versions of typer.
@@ -36,8 +33,7 @@ app = typer.Typer(
 )
 # This order is the order of the commands in the help text.
 for group in (
-    run_commands, batch_commands, study_commands, export_commands, figure_commands, assessment_commands,
-    bench_commands, record_commands, model_commands,
+    run_commands, batch_commands, study_commands, figure_commands, assessment_commands, record_commands, model_commands,
 ):  # fmt: skip
     app.add_typer(group.app)
 

@@ -23,7 +23,7 @@ from msfp_gen.cli.console import (
     say,
     show,
 )
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.common.errors import InputError, RunError
 
 if TYPE_CHECKING:
     from msfp_gen.studies.bounding import Bounds
@@ -46,7 +46,7 @@ def characterise(
     as_json: AsJson = False,
 ) -> None:
     """Effective stiffness, damping, sliding regimes, capacity left, velocity and heat of a run, with envelopes."""
-    from msfp_gen.analysis.characterise.characterisation import CSV_SUFFIXES, write_csv
+    from msfp_gen.analysis.characterise import CSV_SUFFIXES, write_csv
     from msfp_gen.common.output import check_output
 
     if output is not None:
@@ -88,7 +88,7 @@ def bound(
     from msfp_gen.common.output import make_folder
     from msfp_gen.studies.bounding import bound as run_bounds
     from msfp_gen.studies.bounding import bounded_scenes, load_factors
-    from msfp_gen.studies.bounding.output import bounding_tables
+    from msfp_gen.studies.bounding.runs import bounding_tables
 
     chosen, table = load_scene(scene), load_factors(factors)
     bounded_scenes(chosen, table)  # refuses a table that does not fit the bearing before anything is written
@@ -122,7 +122,7 @@ def factors(
 def _bound_suite(scene: str, factors: str, output: Path | None, suite: Path, as_json: bool) -> None:
     """`bound` under every motion of a suite: numbers and the figure, without the rows of the runs."""
     from msfp_gen.common.output import make_folder
-    from msfp_gen.scene.file.suite import load_suite
+    from msfp_gen.scene.file.loader import load_suite
     from msfp_gen.studies.batch import build_models
     from msfp_gen.studies.bounding import bound_suite, bounded_scenes, load_factors
     from msfp_gen.studies.bounding.suite import (
@@ -156,7 +156,7 @@ def _bound_suite(scene: str, factors: str, output: Path | None, suite: Path, as_
 
 def _save(bounds: Bounds, folder: Path) -> list[Path]:
     """Write every run as netCDF, the numbers as CSV and the loops as a figure; returns the paths."""
-    from msfp_gen.studies.bounding.output import plot_bounds, write_quantities
+    from msfp_gen.studies.bounding.runs import plot_bounds, write_quantities
 
     written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in bounds.cases if case.result is not None]
     plot_bounds(bounds, folder / "bounds.png")

@@ -1,22 +1,37 @@
-"""Command for many scenes: batch."""
+"""Commands of many runs: batch; bench work-precision and model-error, which measure error against cost on a scene."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, Workers, note, say, scenes, show
+from msfp_gen.cli.console import (
+    Progress,
+    SceneName,
+    Workers,
+    answer,
+    note,
+    note_written,
+    number,
+    numbers,
+    say,
+    scenes,
+    show,
+)
+from msfp_gen.common.errors import RunError
 from msfp_gen.common.output import check_output, make_folder
 from msfp_gen.common.tables import TABLE_SUFFIXES
-from msfp_gen.errors import RunError
 
 if TYPE_CHECKING:
+    from msfp_gen.scene.scene import Scene
+    from msfp_gen.studies.accuracy.study import Study
     from msfp_gen.studies.sweep import Row, Variation
 
 app = typer.Typer()
@@ -56,7 +71,7 @@ def batch(
     ] = False,
 ) -> None:
     """Simulate many scenes, or one with fields varied, on all cores. Ctrl-C keeps the runs that have ended."""
-    from msfp_gen.scene.file.suite import load_suite
+    from msfp_gen.scene.file.loader import load_suite
     from msfp_gen.studies.batch import ENDED
     from msfp_gen.studies.sweep import variations, varied_field
 
@@ -122,3 +137,105 @@ def _file_name(number: int, count: int, name: str) -> str:
     """The name of a run's file: numbered so that names sort, of characters that no shell needs in quotes."""
     plain = re.sub(r"[^A-Za-z0-9._]+", "-", name)[:LONGEST].strip("-.")
     return f"{number:0{len(str(count))}d}-{plain or 'scene'}.nc"
+
+
+bench = typer.Typer(
+    help="Measure error against cost on a scene: of methods and tolerances, and of simplified models.",
+    epilog="Examples:\n\n\b\n  msfp-gen bench work-precision fenz-monotonic -o study\n"
+    "  msfp-gen bench model-error fenz-test2 -o study",
+)
+app.add_typer(bench, name="bench")
+
+
+Tolerances = Annotated[
+    str | None, typer.Option(metavar="LIST", help="Tolerances, such as 1e-2,1e-4, instead of the default list.")
+]
+Limit = Annotated[float, typer.Option(parser=number, metavar="SECONDS", help="Cut off a run after this wall time.")]
+Duration = Annotated[
+    float | None, typer.Option(parser=number, metavar="SECONDS", help="End the scene after this simulated time.")
+]
+Folder = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="DIR", help="Write CSV, JSON, Markdown, SVG and PNG to this folder."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else.")]
+
+
+@bench.command(
+    "work-precision",
+    epilog="Examples:\n\n\b\n  msfp-gen bench work-precision fenz-monotonic -o study\n"
+    "  msfp-gen bench work-precision scene.toml --methods implicit,Radau --tolerances 1e-2,1e-4 --limit 5",
+)
+def work_precision(
+    scene: SceneName,
+    methods: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Methods, such as implicit,dopri5, instead of all.")
+    ] = None,
+    tolerances: Tolerances = None,
+    limit: Limit = 10.0,
+    duration: Duration = None,
+    output: Folder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Error against cost of every method and tolerance; a second method confirms the reference."""
+    from msfp_gen.studies.accuracy.study import TOLERANCES
+    from msfp_gen.studies.accuracy.study import work_precision as study
+
+    _report(
+        scene,
+        duration,
+        output,
+        as_json,
+        lambda chosen: study(
+            chosen,
+            methods=methods.split(",") if methods else None,
+            tolerances=TOLERANCES if tolerances is None else numbers(tolerances),
+            limit=limit,
+            say=note,
+        ),
+    )
+
+
+@bench.command(
+    "model-error",
+    epilog="Examples:\n\n\b\n  msfp-gen bench model-error fenz-test2 -o study\n"
+    "  msfp-gen bench model-error scene.toml --tolerances 1e-2,1e-3,1e-4",
+)
+def model_error(
+    scene: SceneName,
+    tolerances: Tolerances = None,
+    limit: Limit = 10.0,
+    duration: Duration = None,
+    output: Folder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Error against cost of simplified models: planar, massless, without rims, linearised, OpenSees."""
+    from msfp_gen.studies.accuracy.models import TOLERANCES, model_errors
+
+    _report(
+        scene,
+        duration,
+        output,
+        as_json,
+        lambda chosen: model_errors(
+            chosen, tolerances=TOLERANCES if tolerances is None else numbers(tolerances), limit=limit, say=note
+        ),
+    )
+
+
+def _report(
+    name: str, duration: float | None, folder: Path | None, as_json: bool, study: Callable[[Scene], Study]
+) -> None:
+    """Load the scene, run the study, print it and write its files."""
+    from msfp_gen.buildings.file import load_bearing_scene
+    from msfp_gen.common.output import make_folder
+    from msfp_gen.studies.accuracy.study import as_dict, tables, write
+
+    scene = load_bearing_scene(name)
+    if duration is not None:
+        scene = replace(scene, duration=duration)
+    if folder is not None:
+        make_folder(folder, "--output")
+    result = study(scene)
+    answer(as_dict(result), tables(result), as_json)
+    note_written(write(result, folder) if folder is not None else ())

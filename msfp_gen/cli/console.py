@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import inspect
 import json
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from time import monotonic
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 
+from msfp_gen.common.errors import InputError, RunError, printable
 from msfp_gen.common.fields import Choice, Rule, ruled_fields
-from msfp_gen.errors import InputError, RunError, printable
 from msfp_gen.results.sign import SIGNS
 from msfp_gen.specification.layout import Effects
 
@@ -25,7 +28,7 @@ if TYPE_CHECKING:
     from msfp_gen.buildings.file import AnyScene
     from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.common.tables import Table
-    from msfp_gen.result import Result
+    from msfp_gen.simulation.result import Result
 
     AnyResult = Result | BuildingResult
 
@@ -219,8 +222,8 @@ def load_source(source: str) -> AnyResult | AnyScene:
     """Load a saved result (.nc), or the scene of a file or preset, of one bearing or of a building."""
     if source.lower().endswith(".nc"):
         from msfp_gen.buildings.result import BuildingResult
-        from msfp_gen.result import Result
         from msfp_gen.results.files import read_result
+        from msfp_gen.simulation.result import Result
 
         result: Any = read_result(source, Result, BuildingResult)
         return result  # type: ignore[no-any-return]
@@ -295,3 +298,45 @@ def result_of(loaded: AnyResult | AnyScene) -> tuple[Any, RunError | None]:
         assert failure is not None
         raise failure
     return result, failure
+
+
+# SIGHUP does not exist on all platforms. Python itself handles SIGINT.
+_SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+REPEAT = 0.05  # time after which an interrupt that was lost is repeated [s]
+
+
+@contextmanager
+def signals_as_interrupts() -> Iterator[list[int]]:
+    """Within the block these signals raise KeyboardInterrupt; the list contains the numbers received.
+
+    Python ignores a KeyboardInterrupt in a callback, such as that of a weak reference; it is repeated.
+    """
+    received: list[int] = []
+
+    def interrupt(number: int, _: FrameType | None) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    def repeat(ignored: Any) -> None:
+        if not issubclass(ignored.exc_type, KeyboardInterrupt):
+            before(ignored)
+            return
+        number = received[-1] if received else signal.SIGINT
+        again = threading.Timer(REPEAT, signal.pthread_kill, (threading.main_thread().ident, number))
+        again.daemon = True
+        again.start()
+
+    before, sys.unraisablehook = sys.unraisablehook, repeat
+    # A handler that was set before stays: nohup, for example, ignores SIGHUP.
+    handled = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
+    try:
+        for number in handled:
+            signal.signal(number, interrupt)
+    except ValueError:  # only the main thread may set handlers
+        handled = []
+    try:
+        yield received
+    finally:
+        sys.unraisablehook = before
+        for number in handled:
+            signal.signal(number, signal.SIG_DFL)

@@ -20,8 +20,8 @@ from msfp_gen.cli.console import (
     result_of,
     whole_number,
 )
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output, make_folder
-from msfp_gen.errors import InputError, RunError
 from msfp_gen.results.sign import DEFAULT, sign_of
 
 if TYPE_CHECKING:
@@ -257,8 +257,7 @@ def explore(
     """Write one HTML file in which sliders change a bearing and its motion, and the response is computed at once."""
     from msfp_gen.buildings.file import load_bearing_scene
     from msfp_gen.common.output import check_output
-    from msfp_gen.explorer import write_explorer
-    from msfp_gen.explorer.page import SUFFIXES
+    from msfp_gen.report.explore import SUFFIXES, write_explorer
 
     path = check_output(output, SUFFIXES, "--output")
     first = None if scene is None else load_bearing_scene(scene)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import Progress, note, note_written, number, show
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
-from msfp_gen.errors import InputError
 
 if TYPE_CHECKING:
     from msfp_gen.motions.records import Corrected, Record, ScaleTo
@@ -111,7 +111,7 @@ def suite(
     if spectrum is not None:
         check_output(spectrum, FIGURE_SUFFIXES, "--spectrum")
     from msfp_gen.motions.records.record_tables import suite_tables
-    from msfp_gen.scene.file.suite import load_suite
+    from msfp_gen.scene.file.loader import load_suite
 
     with Progress("spectra") as progress:
         loaded = load_suite(file, progress)

@@ -28,9 +28,9 @@ from msfp_gen.cli.console import (
     say,
     show,
 )
+from msfp_gen.common.errors import InputError, RunError
+from msfp_gen.common.fields import to_si
 from msfp_gen.common.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
-from msfp_gen.common.quantities import to_si
-from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ import typer
 from typer.core import TyperGroup
 
 from msfp_gen.cli.console import AsJson, Progress, Workers, answer, note, number, numbers, say
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.common.tables import TABLE_SUFFIXES
-from msfp_gen.errors import InputError
 
 if TYPE_CHECKING:
     from msfp_gen.common.tables import Table

@@ -16,7 +16,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from msfp_gen.errors import RunError
+from msfp_gen.common.errors import RunError
 
 T = TypeVar("T")
 Files = dict[str, str]

@@ -10,7 +10,7 @@ from glob import escape
 from pathlib import Path
 from secrets import token_hex
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 
 FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
 DATASET_SUFFIXES = (".nc",)

@@ -1,5 +1,1 @@
-"""Models for other programs: the C library of `export`, and the README of a generated folder (docs/embedding.md)."""
-
-from msfp_gen.embedding.library import README, Library, check_guide, export_library, write_guide
-
-__all__ = ["README", "Library", "check_guide", "export_library", "write_guide"]
+"""The bearing in other programs (docs/embedding.md): two-ports, a server, the C library of `export`, units (FMU)."""

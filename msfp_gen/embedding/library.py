@@ -15,16 +15,16 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.output import write_bytes
+from msfp_gen.common.version import __version__
 from msfp_gen.embedding import values
-from msfp_gen.errors import CompileError, InputError
 from msfp_gen.generator.interface import ABI_VERSION, CALL_ERRORS, effects_text, model_name, surface_values
 from msfp_gen.jit.build import ENTRY
 from msfp_gen.jit.compiler import FLAGS
 from msfp_gen.jit.library import STATIC, BuiltLibrary, Platform, build_library, find_platform
-from msfp_gen.specification import contract, rows
+from msfp_gen.specification import contract
 from msfp_gen.specification.layout import ModelSpec
-from msfp_gen.version import __version__
 
 SHARE = "share/msfp"
 # Template -> path below the prefix.
@@ -106,8 +106,8 @@ def _tree(models: dict[str, ModelSpec], built: BuiltLibrary, platform: Platform,
 
 def _content(models: dict[str, ModelSpec], platform: Platform, target: str | None) -> dict[str, Any]:
     """What the templates need."""
-    from msfp_gen.generator import declarations
-    from msfp_gen.generator.header import public_header, word_enums  # it imports SymPy
+    from msfp_gen.generator import interface
+    from msfp_gen.generator.interface import public_header, word_enums  # it imports SymPy
 
     modules = [
         {
@@ -129,7 +129,7 @@ def _content(models: dict[str, ModelSpec], platform: Platform, target: str | Non
         "body": contract.names(contract.BODY),
         "top": contract.names(contract.TOP),
         "words": word_enums(),
-        "types": declarations.fortran(public_header()),
+        "types": interface.fortran(public_header()),
         "errors": CALL_ERRORS,
         "static": STATIC,
         "platform": platform,
@@ -146,8 +146,8 @@ def _has_ports(spec: ModelSpec) -> bool:
     return spatial and effects.top_rotation and not effects.uplift
 
 
-def render(name: str, content: dict[str, Any], package: str = __package__) -> str:
-    """Text of the template `assets/<name>.jinja` of a package; a name that `content` lacks is an error."""
+def render(name: str, content: dict[str, Any]) -> str:
+    """Text of the template `assets/<name>.jinja`; a name that `content` lacks is an error."""
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(
@@ -158,7 +158,7 @@ def render(name: str, content: dict[str, Any], package: str = __package__) -> st
     environment.filters["c"] = _number
     environment.filters["fortran"] = _fortran_number
     environment.filters["fortran_list"] = _fortran_list
-    text = files(package).joinpath("assets", f"{name}.jinja").read_text(encoding="utf-8")
+    text = files(__package__).joinpath("assets", f"{name}.jinja").read_text(encoding="utf-8")
     return environment.from_string(text).render(content)
 
 
@@ -319,7 +319,7 @@ def _guide_content(spec: ModelSpec, folder: Path, module: str) -> dict[str, Any]
         "body": contract.BODY,
         "surface": surface_values(spec),
         "top": contract.TOP,
-        "row": rows.row(spec.effects),
+        "row": contract.row(spec.effects),
         "works": contract.WORKS,
         "kinds": contract.EVENT_KINDS,
         "statuses": [status for status in contract.STATUSES if status.compiled],

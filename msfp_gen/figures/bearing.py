@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.analysis.transitions import SYMBOLS, is_monotonic, transitions
+from msfp_gen.analysis.summary import SYMBOLS, is_monotonic, transitions
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures.section import draw_circles, draw_section, peak_time
 from msfp_gen.figures.style import (

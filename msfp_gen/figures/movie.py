@@ -17,8 +17,8 @@ import numpy as np
 
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import check_output, replacing
-from msfp_gen.errors import InputError
 from msfp_gen.figures.bearing import draw_bars, draw_orbit, moving_axes
 from msfp_gen.figures.building import MovingFrame, draw_axial_history, magnification, plan_of, title_of
 from msfp_gen.figures.section import STEEL, direction_of, draw_section, limits

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.figures.style import COLOURS, FAINT, INK, LINE, SMALL, THIN, headline, page
 
 if TYPE_CHECKING:

@@ -6,6 +6,9 @@
 | compile | `msfp_gen.jit.compiler` | sources, runtime's C -> extension; object of the wrapper, kept for all |
 | store | `msfp_gen.jit.cache` | folder -> entry with a manifest |
 | load | `msfp_gen.jit.build` | extension -> imported module |
+
+Drivers of two-ports, such as the run of a building, are built, cached and loaded in the same way. They include `msfp.h`
+and know models by their tables of functions alone, so one build serves all models.
 """
 
 from __future__ import annotations
@@ -17,16 +20,19 @@ import re
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache as remember
+from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from time import perf_counter
 from types import ModuleType
 from typing import Any
 
+from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit import cache
-from msfp_gen.jit.compiler import LOG_NAME, compile_extension
-from msfp_gen.jit.prebuilt import find_prebuilt, prebuilt_key
+from msfp_gen.jit.compiler import EXTENSION_SUFFIX, LOG_NAME, compile_extension
+from msfp_gen.jit.prebuilt import find_prebuilt, find_prebuilt_driver, prebuilt_key
 from msfp_gen.specification.layout import ModelSpec
 
 Progress = Callable[[str, float], None]
@@ -286,3 +292,68 @@ def build_table(info: BuildInfo) -> Table:
             ("extension", info.path.name),
         ],
     )
+
+
+LIBRARIES = ("-pthread",)
+SUFFIXES = (".c", ".h", ".pyx")
+
+
+@remember
+def load_driver(package: str) -> tuple[ModuleType, str]:
+    """The module of the `.pyx` and the C files in `<package>/compiled`, and the hash of all that determines it.
+
+    Raises CompileError: no C compiler was found, or it rejected a file; InputError: the cache cannot be written to.
+    """
+    module, files = _named(package)
+    if (ready := find_prebuilt_driver(module, files)) is not None:
+        folder, manifest = ready
+        return load_extension(folder / manifest.extension, module), prebuilt_key(manifest)
+    entry = build_driver(package)
+    return load_extension(entry.folder / f"{module}{EXTENSION_SUFFIX}", module), entry.key
+
+
+def build_driver(package: str) -> cache.Entry:
+    """The module of a package in the cache, built unless it is there; errors as of `load_driver`."""
+    module, files = _named(package)
+    entry = cache.Entry.of_files(module, files)
+    entry.find_or_build(lambda part: _build_driver(entry, files, part))
+    return entry
+
+
+def _named(package: str) -> tuple[str, dict[str, str]]:
+    """Name of the module of a package, and its files."""
+    files = sources(resources.files(package) / "compiled")
+    return next(Path(name).stem for name in files if name.endswith(".pyx")), files
+
+
+def sources(folder: Traversable) -> dict[str, str]:
+    """The sources in a folder: file name -> text."""
+    paths = sorted(folder.iterdir(), key=lambda file: file.name)
+    return {file.name: file.read_text(encoding="utf-8") for file in paths if file.name.endswith(SUFFIXES)}
+
+
+def headers() -> dict[str, str]:
+    """The headers that a driver includes: file name -> text."""
+    from msfp_gen.generator.interface import public_header
+
+    runtime = resources.files("msfp_gen") / "runtime"
+    own = {name: (runtime / name).read_text(encoding="utf-8") for name in ("msfp_math.h", "msfp_hash.h", "msfp_time.h")}
+    return {"msfp.h": public_header(), **own}
+
+
+def _build_driver(entry: cache.Entry, files: dict[str, str], folder: Path) -> cache.Manifest:
+    begin = perf_counter()
+    extension = compile_extension({**files, **headers()}, entry.module, folder, libraries=LIBRARIES)
+    manifest = cache.Manifest(
+        module=entry.module,
+        spec=entry.module,
+        key=entry.key,
+        inputs=entry.inputs,
+        extension=extension.name,
+        files={path.name: cache.digest(path) for path in sorted(folder.iterdir())},
+        statements=0,
+        operations=0,
+        stages={"compile": perf_counter() - begin},
+    )
+    manifest.write(folder)
+    return manifest

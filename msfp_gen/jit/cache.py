@@ -21,10 +21,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from msfp_gen.errors import CompileError, InputError
+from msfp_gen.common.errors import CompileError, InputError
+from msfp_gen.common.version import __version__
 from msfp_gen.jit.compiler import EXTENSION_SUFFIX, FLAGS, find_compiler, processor_flags
 from msfp_gen.specification.layout import Layout, ModelSpec
-from msfp_gen.version import __version__
 
 MANIFEST_NAME = "manifest.json"
 PACKAGE = Path(__file__).parents[1]

@@ -26,8 +26,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from msfp_gen.common.cores import usable_cores
+from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.output import write_bytes, write_text
-from msfp_gen.errors import CompileError, InputError
 
 COMPILER, CFLAGS = "CC", "MSFP_GEN_CFLAGS"
 # With these a compiler assumes that no number is infinite or NaN and drops the checks for them.

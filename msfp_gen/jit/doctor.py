@@ -13,8 +13,8 @@ from importlib import metadata
 from pathlib import Path
 from time import perf_counter
 
+from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit.build import load_extension
 from msfp_gen.jit.cache import cache_root
 from msfp_gen.jit.compiler import check_headers, compile_extension, find_compiler

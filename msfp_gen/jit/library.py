@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.output import write_text
-from msfp_gen.errors import CompileError, InputError
 from msfp_gen.generator.interface import ABI_VERSION, model_name
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import (

@@ -1,8 +1,8 @@
 """Models that a wheel brings compiled, so that common layouts need no compiler; made by `tools/prebuilt_wheel.py`.
 
-`msfp_gen/prebuilt/` has one folder for each model and level of the processor, and one for each driver (`driver.py`),
-with a manifest and an extension that uses
-only the limited API of Python, so that one file serves all versions. A checkout has none, nor has a pure wheel.
+`msfp_gen/prebuilt/` has one folder for each model and level of the processor, and one for each driver of two-ports
+(`build.py`), with a manifest and an extension that uses only the limited API of Python, so that one file serves all
+versions. A checkout has none, nor has a pure wheel.
 """
 
 from __future__ import annotations

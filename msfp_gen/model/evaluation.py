@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.scene.friction_parameters import surface_numbers
-from msfp_gen.scene.seats import seat_stiffness
+from msfp_gen.scene.standing import seat_stiffness
 from msfp_gen.scene.top import MassTop, Top, load_values
 from msfp_gen.specification import contract
 from msfp_gen.specification.contract import STATUSES

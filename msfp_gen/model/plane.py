@@ -10,7 +10,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.elementary import cos, sin
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion

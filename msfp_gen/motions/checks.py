@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import LARGEST, Text
-from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise
 
 _JUMPS = (

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.elementary import cos, sin
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import require_type
-from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise, samples, waveforms
 from msfp_gen.motions.checks import checked_pieces, number, numbers, order, positive, storable
 from msfp_gen.motions.piecewise import Metadata, Pieces

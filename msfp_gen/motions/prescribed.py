@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.motions import piecewise
 from msfp_gen.motions.checks import finite, increasing, number, numbers, order, positive, storable, vector
 from msfp_gen.motions.piecewise import ORDER, powers

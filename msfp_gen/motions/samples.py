@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite, positive, samples
 from msfp_gen.motions.piecewise import ORDER, Pieces, from_rates
 

@@ -11,12 +11,12 @@ from importlib.resources import files
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.errors import InputError
+from msfp_gen.common.version import __version__
 from msfp_gen.results.files import COUNTER, PROVENANCE, without
 from msfp_gen.results.note import by_importance
 from msfp_gen.results.run_data import BearingData
-from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from markupsafe import Markup

@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, Typ
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output, replacing, write_bytes
 from msfp_gen.common.tables import parquet_bytes
-from msfp_gen.errors import InputError
 from msfp_gen.results.note import Note
 from msfp_gen.results.sign import DEFAULT, VARIABLES, sign_of
 from msfp_gen.results.stored_group import ArrayDigest, Attribute, StoredGroup, digest, seal, stored_groups

@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar, Literal, get_origin, get_type_hints
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 
 # Labels of the dimensions of fixed length. The length of `body` and `surface` is the number of surfaces, n - 1.
 LABELS: dict[str, tuple[str, ...]] = {

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.results.files import ResultFiles
 from msfp_gen.results.history import History, first_peak, quantities
 

@@ -11,7 +11,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.model.evaluation import separations_at_rest
 from msfp_gen.model.plane import out_of_plane, rotated_pairs, tilts_out_of_plane
 from msfp_gen.results.geometry import rim_forces
-from msfp_gen.scene.seats import seat_stiffness
+from msfp_gen.scene.standing import seat_stiffness
 from msfp_gen.scene.top import sprung_mass
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 
 VARIABLES = ("displacement", "top_force", "top_moment")  # that change their sign
 

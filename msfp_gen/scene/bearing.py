@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import check_fields, errors_at, paired, require_type
-from msfp_gen.errors import InputError
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import Layout
 from msfp_gen.specification.values import Bound, rules

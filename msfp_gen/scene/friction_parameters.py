@@ -10,11 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.specification.formula import Operations, fold, names_in
-from msfp_gen.specification.friction_laws import BUILT_IN, HEAT, MEMORIES, VARIABLES, Law, law_parameter_names
-from msfp_gen.specification.spin import NUMBERS as MOMENT_NUMBERS
-from msfp_gen.specification.spin import SPIN
+from msfp_gen.specification.friction_laws import (
+    BUILT_IN,
+    HEAT,
+    MEMORIES,
+    SPIN,
+    SPIN_NUMBERS,
+    VARIABLES,
+    Law,
+    law_parameter_names,
+)
 
 if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing, Surface
@@ -96,7 +103,7 @@ def check_bearing(law: Law | None, word: str, spin: str, bearing: Bearing) -> No
     moments = {name: set(way.values) for name, way in SPIN.items()}
     for index, surface in enumerate(bearing.surfaces):
         _check_takers(surface, index, law_parameter_names(), f"effects.friction = {word!r}", laws[word], laws)
-        _check_takers(surface, index, MOMENT_NUMBERS, f"effects.spin = {spin!r}", moments[spin], moments)
+        _check_takers(surface, index, SPIN_NUMBERS, f"effects.spin = {spin!r}", moments[spin], moments)
         _drilling_numbers(spin, surface, index)
         if law is not None:
             defect = _defect(law, (("mu", surface.friction), *law_parameters(law, bearing, index).items()))

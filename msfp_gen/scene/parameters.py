@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, errors_at, ruled_fields
-from msfp_gen.errors import InputError
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.friction_parameters import law_parameters
 from msfp_gen.scene.scene_fields import InitialState
-from msfp_gen.scene.seats import seat_stiffness
+from msfp_gen.scene.standing import seat_stiffness
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion

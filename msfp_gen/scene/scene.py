@@ -5,23 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import check_fields, require_type
-from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.motions.time_grid import TIME_TOLERANCE
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection, select_effects
 from msfp_gen.scene.friction_parameters import check_bearing
-from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.planarity import scene_plane
-from msfp_gen.scene.scene_fields import InitialState, SceneFields, Stop
-from msfp_gen.scene.seats import check_seats
+from msfp_gen.scene.scene_fields import InitialState, Limits, SceneFields, Stop
 from msfp_gen.scene.solver import Solver
-from msfp_gen.scene.standing import check_standing, standing_of
+from msfp_gen.scene.standing import check_seats, check_standing, standing_of
 from msfp_gen.scene.top import NodeTop, Top
 from msfp_gen.specification import contract
-from msfp_gen.specification.heat_kernel import LONGEST
+from msfp_gen.specification.friction_laws import LONGEST
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
 

@@ -1,4 +1,4 @@
-"""The fields of a scene: the input of effect selection and of the search for a vertical plane."""
+"""The fields of a scene, and limits of the device: what effect selection works on."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.common.identity import NO_NUMBERS
-from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.friction_parameters import select_friction
-from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import Top
 from msfp_gen.specification import contract
@@ -23,6 +22,34 @@ from msfp_gen.specification.layout import Auto, Effects
 from msfp_gen.specification.values import rules
 
 _RUN = rules((*contract.RUN, *contract.ARRAYS))
+
+
+_FORCE, _LENGTH, _TIME = Quantity("N", above=0.0), Quantity("m", above=0.0), Quantity("s", above=0.0)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of the device, of each bearing of a building. No number of a run depends on them, only its verdict.
+
+    rim_force: of a rim [N]; None: a third of the axial load at rest, of the largest normal force where the load varies.
+    rim_compression: of a rim [m]; None: none. uplift_height: clearance between the faces of a surface [m]; None: the
+    height at which its rim acts, the rim_offset of its slider. uplift_duration: longest time for which a surface is
+    open [s]. temperature: at the centre of a surface [degC]. axial_load: largest vertical force on what is carried [N];
+    None: none. displacement: largest horizontal one across the bearing [m]; None: none. Raises InputError.
+    """
+
+    rim_force: Annotated[float | None, _FORCE] = None
+    rim_compression: Annotated[float | None, _LENGTH] = None
+    uplift_height: Annotated[float | None, _LENGTH] = None
+    uplift_duration: Annotated[float, _TIME] = 0.1
+    temperature: Annotated[float, Quantity("degC", above=-273.15)] = 250.0
+    axial_load: Annotated[float | None, _FORCE] = None
+    displacement: Annotated[float | None, _LENGTH] = None
+
+    def __post_init__(self) -> None:
+        check_fields(self, "limits")
+
+
 FIDELITIES = {
     "exact": "the scene as it is given",
     "loose": "a loose tolerance",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import check_fields
-from msfp_gen.errors import InputError
 from msfp_gen.specification import contract
 from msfp_gen.specification.values import rules
 

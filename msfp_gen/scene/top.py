@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, check_fields, paired
-from msfp_gen.errors import InputError
 from msfp_gen.specification import contract
 from msfp_gen.specification.values import rules
 

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import check_folder, clear_leftovers, write_bytes
-from msfp_gen.errors import InputError
 from msfp_gen.simulation.row_file import RowFile, rows_beside
 
 if TYPE_CHECKING:

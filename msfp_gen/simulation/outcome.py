@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.common.version import __version__
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.geometry import contact_offsets
 from msfp_gen.results.note import Note, monitor_notes
@@ -20,8 +21,7 @@ from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.standing import MARGIN, standing_of
 from msfp_gen.scene.top import MassTop, RigTop
 from msfp_gen.specification.contract import STATUSES
-from msfp_gen.specification.hysteresis import is_plastic
-from msfp_gen.version import __version__
+from msfp_gen.specification.friction_laws import is_plastic
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Run

@@ -14,8 +14,8 @@ from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.scene.scene_fields import InitialState
 from msfp_gen.scene.solver import Solver
+from msfp_gen.specification.friction_laws import SPIN
 from msfp_gen.specification.layout import Auto
-from msfp_gen.specification.spin import SPIN
 
 if TYPE_CHECKING:
     from msfp_gen.results.gradient import Gradients

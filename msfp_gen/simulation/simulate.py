@@ -18,11 +18,10 @@ from msfp_gen.buildings.compiled_run import result_of as building_result
 from msfp_gen.buildings.compiled_run import start_run as start_building
 from msfp_gen.buildings.dataset import scene_text
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output
-from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
-from msfp_gen.result import Result
 from msfp_gen.results.history import Counters, History
 from msfp_gen.results.joining import joined, thinned_history
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
@@ -41,12 +40,12 @@ from msfp_gen.simulation.checkpoint import (
     require_no_checkpoint,
     segment_file,
 )
-from msfp_gen.simulation.gradient_inputs import start_gradients
 from msfp_gen.simulation.gradients import (
     INEXACT,
     gradient_notes,
     gradient_parameters,
     run_gradients,
+    start_gradients,
     switching_error,
     with_gradient_errors,
 )
@@ -60,6 +59,7 @@ from msfp_gen.simulation.outcome import (
     provenance_of,
     stopped,
 )
+from msfp_gen.simulation.result import Result
 from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
 from msfp_gen.simulation.segment import Segment, start_run, start_temperatures
 from msfp_gen.simulation.settling import (

@@ -31,8 +31,8 @@ from msfp_gen.scene.top import is_sprung
 from msfp_gen.simulation.segment import Segment, start_temperatures
 
 if TYPE_CHECKING:
-    from msfp_gen.result import Result
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.simulation.result import Result
 
 
 class StreamedRows:

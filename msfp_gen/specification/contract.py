@@ -8,22 +8,23 @@ holds them against them. SI units throughout.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from msfp_gen.common.fields import Quantity
-from msfp_gen.specification import friction_laws, spin
+from msfp_gen.specification import friction_laws
+from msfp_gen.specification.friction_laws import TEMPERATURE
 from msfp_gen.specification.values import Array, Bound, Value
 
 if TYPE_CHECKING:
     from msfp_gen.specification.layout import Effects
-
 
 _LENGTH, _OFFSET = Quantity("m", above=0.0), Quantity("m", least=0.0)
 _INERTIA = Quantity("kg m^2", above=0.0)
 _TIME = Quantity("s", above=0.0)
 _STIFFNESS, _DAMPING = Quantity("N/m", least=0.0), Quantity("N s/m", least=0.0)
 
-NUMBERS = friction_laws.NUMBERS | spin.NUMBERS
+NUMBERS = friction_laws.NUMBERS | friction_laws.SPIN_NUMBERS
 """Every number of a surface that a friction law or a drilling moment may need, and every value derived from them."""
 GRAVITY = Value("gravity", Quantity("m/s^2", least=0.0), "gravity")
 BODY = (  # of each body, the base first
@@ -315,3 +316,91 @@ STATUSES = (
 def names(entries: tuple[Value | Word | Status, ...]) -> tuple[str, ...]:
     """Names of the entries of a table, in order."""
     return tuple(entry.name for entry in entries)
+
+
+class Extent(StrEnum):
+    """Length of a dimension of a row's field that the model decides: the macro of the C header."""
+
+    SURFACES = "MSFP_NB"  # n - 1: moving bodies, or surfaces
+    COORDINATES = "MSFP_NQ"  # psi, theta, phi; in models with uplift then the separation along E1, E2, E3
+    WORKS = "MSFP_WORKS"  # integrals over the run, `WORKS`
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One field of a row of output. needs: the feature of a model without which it is absent ("" for none)."""
+
+    name: str
+    shape: tuple[Extent | int, ...]
+    unit: str
+    meaning: str
+    needs: str = ""
+
+
+_N = Extent.SURFACES
+_MOTION = (_N, Extent.COORDINATES)
+_ROW = (
+    Recorded("time", (), "s", "time"),
+    Recorded("q", _MOTION, "rad, m", "coordinates of the moving bodies: psi, theta, phi, then the separation"),
+    Recorded("v", _MOTION, "rad/s, m/s", "their rates"),
+    Recorded("a", _MOTION, "rad/s^2, m/s^2", "their second derivatives"),
+    Recorded("f", (_N, 2), "-", "friction state Y, Z"),
+    Recorded("normal", (_N,), "N", "normal force"),
+    Recorded("angles", (_N, 2), "rad", "contact position psi~, theta~"),
+    Recorded("sliding", (_N,), "m", "sliding displacement (3.20)"),
+    Recorded("gap", (_N,), "m", "gap to the rim (3.21)"),
+    Recorded("rim", (_N,), "N", "rim force, compression positive"),
+    Recorded("force", (_N, 3), "N", "interface force on the body above"),
+    Recorded("slip", (_N, 2), "m/s", "slip velocity u~, v~ (2.98)"),
+    Recorded("compression", (_N,), "m", "compression of the unilateral contact; negative: open", "uplift"),
+    Recorded("base", (3,), "m", "displacement of the base"),
+    Recorded("top", (3,), "m", "position of r_nn at the top plate"),
+    Recorded("top_force", (3,), "N", "force of the bearing on the top support"),
+    Recorded("top_moment", (3,), "N m", "moment of the bearing on the top support at r_nn"),
+    Recorded("top_settlement", (), "m", "compression of the vertical spring of the top"),
+    Recorded("kinetic", (), "J", "kinetic energy relative to the base"),
+    Recorded("potential", (), "J", "potential energy"),
+    Recorded("restraint", (), "J", "energy of the springs of the top"),
+    Recorded("rim_stored", (), "J", "energy of the springs of the rims"),
+    Recorded("seat_stored", (), "J", "energy of the springs of the unilateral contacts"),
+    Recorded("work", (Extent.WORKS,), "J", "integrals over the run"),
+    Recorded("mu", (_N,), "-", "friction coefficient", "law"),
+    Recorded("temperature", (_N,), "degC", "temperature of the surface", "heat"),
+    Recorded("memory", (_N,), "-", "what the surface remembers, on which its friction law depends", "memory"),
+)
+
+
+_EXTREMES = (
+    Recorded("displacement", (4,), "m", "largest magnitude along E1, E2, E3 and in the horizontal plane"),
+    Recorded("top_force", (4,), "N", "largest magnitude along E1, E2, E3 and in the horizontal plane"),
+    Recorded("sliding", (_N,), "m", "largest sliding displacement"),
+    Recorded("gap", (_N,), "m", "least gap to the rim"),
+    Recorded("slip_speed", (_N,), "m/s", "largest slip velocity"),
+    Recorded("least_normal", (_N,), "N", "least normal force"),
+    Recorded("most_normal", (_N,), "N", "largest normal force"),
+    Recorded("least_friction", (_N,), "-", "least friction coefficient", "law"),
+    Recorded("most_friction", (_N,), "-", "largest friction coefficient", "law"),
+    Recorded("temperature", (_N,), "degC", "highest temperature", "heat"),
+)
+
+
+def row(effects: Effects) -> tuple[Recorded, ...]:
+    """Fields of a row of a model with these effects, in order."""
+    return _present(_ROW, effects)
+
+
+def extremes(effects: Effects) -> tuple[Recorded, ...]:
+    """Extremes that a run of a model with these effects records over all of its steps, in order."""
+    return _present(_EXTREMES, effects)
+
+
+def _present(quantities: tuple[Recorded, ...], effects: Effects) -> tuple[Recorded, ...]:
+    law, memory = effects.law, None if effects.law is None else effects.law.memory
+    has = {
+        "": True,
+        "uplift": effects.uplift,
+        "law": law is not None,
+        "heat": memory is TEMPERATURE,
+        "memory": memory not in (None, TEMPERATURE),
+    }
+    return tuple(quantity for quantity in quantities if has[quantity.needs])

@@ -1,22 +1,123 @@
-"""Friction laws: the friction coefficient as a formula of sliding velocity, pressure, temperature or normal force.
+"""Friction as data: laws of its coefficient, frictional heating, hysteresis, and what resists spin.
 
 The names in a formula are those of `VARIABLES` and of fields of `Surface`; `mu` is the reference coefficient
 `Surface.friction`. The formula determines which parameters a surface must define and whether the law needs the pressure
 or a memory of the surface, such as its temperature. The generator derives the equations from the same formula, and
 `scene/friction_parameters.py` evaluates it.
+
+Heating: the temperature is T = T_0 + sqrt(D/pi)/k times the integral of q(t - tau)/sqrt(tau) over tau (Carslaw and
+Jaeger; Kumar et al. 2015). With 1/sqrt(tau) approximated by the sum of w_i exp(-lambda_i tau) it becomes T = T_0 + sum
+of h_i, where dh_i/dt = -lambda_i h_i + w_i flux: each h_i is one state of a surface. The rates lambda_i form a
+geometric progression. The weights w_i minimise the largest relative error over [SHORTEST, LONGEST] under two
+conditions: none is negative, and the integral over [0, SHORTEST] is exact. They are fitted by
+`benchmarks/heat_kernel.py`.
+
+Hysteresis by Bouc-Wen (3.18): dY/dt = (u - Y (a Y u + b Z v))/d_y and dZ/dt = (v - Z (a Y u + b Z v))/d_y, where u, v
+are the components of the slip velocity. A law, which `Effects.bouc_wen` selects by name, gives the switches a, b, each
+0 or 1, from the products Y u and Z v. They are 1 where the friction state grows and 0 where it unloads elastically.
+Elastic-perfectly plastic: (Y, Z) follows the slip over d_y and is projected onto the unit disc (radial return).
+
+Spin: what resists it between the two bodies of a surface, which `Effects.spin` selects by name, is a formula of the
+drilling moment about the contact normal. Its derivatives, its power, its part in the momentum balances and the columns
+of the C arrays follow from it.
 """
 
 from __future__ import annotations
 
 import ast
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity
-from msfp_gen.errors import InputError
 from msfp_gen.specification.formula import names_in, parse, units_of
-from msfp_gen.specification.heat_kernel import HEAT_KERNEL
 from msfp_gen.specification.values import Value
+
+
+class Hysteresis(NamedTuple):
+    """One hysteresis law.
+
+    Attributes:
+        meaning: text for help and explanations.
+        switches: function of Y u [m/s], Z v [m/s] and `step` that returns (a, b); `step` is the Heaviside function, 1
+            for a positive argument and 0 otherwise. None: elastic-perfectly plastic, which has no switches.
+    """
+
+    meaning: str
+    switches: Callable[[Any, Any, Callable[[Any], Any]], tuple[Any, Any]] | None
+
+
+HYSTERESIS = {
+    "report": Hysteresis(
+        "one switch for each axis (2.94)-(2.98)",
+        lambda yu, zv, step: (step(yu), step(zv)),
+    ),
+    "isotropic": Hysteresis(
+        "one switch along the slip velocity, the same in every direction",
+        lambda yu, zv, step: (step(yu + zv),) * 2,
+    ),
+    "plastic": Hysteresis("elastic-perfectly plastic: no creep under small cycles, friction along the slip", None),
+}
+
+
+class _Product:
+    """Stands for Y u when a law is inspected: adding zero returns it, and any other operation raises TypeError."""
+
+    def __add__(self, other: object) -> _Product:
+        return self if other == 0 else NotImplemented
+
+    __radd__ = __add__
+
+
+def is_plastic(law: str) -> bool:
+    """Whether a law is elastic-perfectly plastic."""
+    return HYSTERESIS[law].switches is None
+
+
+def has_closed_form(law: str) -> bool:
+    """Whether the friction state in the plane, where Z v = 0, is a function of the slip in closed form.
+
+    It is a tanh where the switch is a = step(Y u), and a bounded line where the law is plastic.
+    """
+    switches = HYSTERESIS[law].switches
+    if switches is None:
+        return True
+    yu, step_of_yu = _Product(), object()
+    try:
+        switch = switches(yu, 0, lambda x: step_of_yu if x is yu else None)[0]
+    except TypeError:  # the switch is another expression of Y u
+        return False
+    return switch is step_of_yu
+
+
+SHORTEST, LONGEST = 1e-3, 1e3
+"""Range of times over which the sum approximates the kernel [s]; heat older than LONGEST is neglected."""
+HEAT_ERROR = 1.8e-3
+"""Bound of the relative error of the kernel in that range [-]."""
+HEAT_ONSET = 6e-3
+"""Bound of half the integral of |error| over [0, SHORTEST] [s^1/2]: temperature error per unit change of a flux that
+changes within that time (docs/friction.md)."""
+
+HEAT_KERNEL: tuple[tuple[float, float], ...] = (
+    (6.0000000000e03, 1.2078817073e02),
+    (1.6832329748e03, 2.8458871434e01),
+    (4.7221220791e02, 1.5622216602e01),
+    (1.3247385991e02, 8.3021979222e00),
+    (3.7164061550e01, 4.3187491334e00),
+    (1.0425962313e01, 2.3486816271e00),
+    (2.9248872599e00, 1.2081621465e00),
+    (8.2054444726e-01, 6.5997556553e-01),
+    (2.3019457849e-01, 3.3852067045e-01),
+    (6.4578517522e-02, 1.8581755062e-01),
+    (1.8116781693e-02, 9.3342760085e-02),
+    (5.0824607238e-03, 5.7161762604e-02),
+    (1.4258275806e-03, 1.0537004578e-02),
+    (4.0000000000e-04, 4.2786061899e-02),
+)
+"""(lambda_i [1/s], w_i [s^-1/2])."""
+
 
 COEFFICIENTS = ("c1", "c2", "c3", "c4")
 # Surface parameters that a law of pressure (PATCH) or temperature (HEAT) needs besides its own, with their defaults.
@@ -252,3 +353,47 @@ def law_parameter_names() -> tuple[str, ...]:
     """Fields of `Surface` that are parameters of any friction law; they are None on a surface of constant friction."""
     names = dict.fromkeys(name for law in BUILT_IN.values() for name in law.parameters)
     return (*names, *COEFFICIENTS)
+
+
+SPIN_VARIABLES = (
+    Value("mu", Quantity(""), "friction coefficient"),
+    Value("N", Quantity("N"), "normal force"),
+    Value("r", Quantity("m"), "radius of the rim of the slider"),
+    Value("w", Quantity("rad/s"), "spin of the body above against the body below, about the contact normal"),
+)
+"""What a formula may contain besides the numbers of the surface."""
+
+
+@dataclass(frozen=True)
+class Spin:
+    """One way in which spin is resisted.
+
+    Attributes:
+        meaning: text for help and explanations.
+        moment: formula of the moment on the body above, about the contact normal [N m]; empty: none.
+        values: numbers of the surface in the formula, which must be given.
+        locked: whether bodies do not spin at all.
+    """
+
+    meaning: str
+    moment: str = ""
+    values: tuple[str, ...] = ()
+    locked: bool = False
+
+    @cached_property
+    def tree(self) -> ast.expr:
+        """Syntax tree of the moment."""
+        return parse(self.moment, {*(variable.name for variable in SPIN_VARIABLES), *self.values})
+
+
+SPIN = {
+    "locked": Spin("bodies do not turn about their own axis", locked=True),
+    "patch": Spin(
+        "a drilling moment over the contact patch resists spin",
+        "-2 / 3 * mu * r * N * w / sqrt(w ** 2 + 0.01 ** 2)",  # w_0 = 0.01 rad/s: docs/model.md
+    ),
+    "free": Spin("no moment resists spin, as in PEER 2017/07"),
+}
+_SPIN_NUMBERS: tuple[Value, ...] = ()
+SPIN_NUMBERS = {value.name: value for value in _SPIN_NUMBERS}
+"""Every number of a surface in a formula."""

@@ -9,11 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Annotated, Literal
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Choice, Quantity, check_fields
-from msfp_gen.errors import InputError
-from msfp_gen.specification.friction_laws import FRICTION, Law, law_of
-from msfp_gen.specification.hysteresis import HYSTERESIS, has_closed_form
-from msfp_gen.specification.spin import SPIN, Spin
+from msfp_gen.specification.friction_laws import FRICTION, HYSTERESIS, SPIN, Law, Spin, has_closed_form, law_of
 
 _COUNT = Quantity("", least=0, whole=True)
 

@@ -11,7 +11,7 @@ from typing import Any
 from msfp_gen.buildings.file import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.cores import usable_cores
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene

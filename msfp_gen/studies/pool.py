@@ -26,7 +26,7 @@ from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
 from msfp_gen.common.cores import usable_cores
-from msfp_gen.errors import InputError, MsfpError, RunError
+from msfp_gen.common.errors import InputError, MsfpError, RunError
 
 T = TypeVar("T")
 S = TypeVar("S")

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.buildings.file import AnyScene, with_absolute_paths
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.tables import Table, write_columns
-from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.file.changes import keys_of
 from msfp_gen.scene.file.loader import scene_table
 from msfp_gen.studies.columns import Counts, Source, catalogue, plain_cell, value_at
@@ -21,8 +21,8 @@ from msfp_gen.studies.study.axes import Axis, Recipe, SceneFactory, located, mot
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult
-    from msfp_gen.result import Result
-    from msfp_gen.scene.file.suite import SuiteRecord
+    from msfp_gen.scene.file.loader import SuiteRecord
+    from msfp_gen.simulation.result import Result
 
 MAX_SCENES = 100_000  # of one sweep; more are taken to be a typing error
 WIDTH = 80  # columns of a terminal

@@ -19,7 +19,7 @@ from support.damaged_records import CSV, MUTATIONS, WAVES
 
 from msfp_gen.buildings.file import load_scene
 from msfp_gen.cli import main
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.scene.file.loader import dumps, scene_text
 from msfp_gen.scene.file.motion_tables import RECORDS
 

@@ -14,9 +14,9 @@ from support.synthetic import loops, ramp
 from msfp_gen.cli import main
 from msfp_gen.cli.console import Progress
 from msfp_gen.cli.run_commands import DEMO
-from msfp_gen.errors import CompileError, RunError
+from msfp_gen.common.errors import CompileError, RunError
 from msfp_gen.jit.build import BuildInfo
-from msfp_gen.result import Result
+from msfp_gen.simulation.result import Result
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def test_help_has_examples(arguments, capsys):
 
 
 def test_version(capsys):
-    from msfp_gen.version import __version__
+    from msfp_gen.common.version import __version__
 
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"msfp-gen {__version__}\n"

@@ -19,9 +19,9 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *s
 
 # The packages and the modules beside them, lowest first: each imports only itself and what stands before it.
 ORDER = (
-    "version", "errors", "common", "specification", "generator", "templates", "runtime", "jit", "embedding", "motions",
-    "scene", "model", "coupling", "results", "analysis", "buildings", "fmu", "figures", "result", "simulation",
-    "studies", "report", "explorer", "", "cli", "__main__",
+    "common", "specification", "generator", "templates", "runtime", "jit", "motions", "scene",
+    "model", "embedding", "results", "analysis", "buildings", "figures", "simulation",
+    "studies", "report", "", "cli", "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -86,7 +86,7 @@ def place(name):
 
 
 def test_the_reader_of_imports_sees_them():
-    assert "msfp_gen.errors" in ours(ROOT / "msfp_gen" / "specification" / "layout.py", late=False)
+    assert "msfp_gen.common.errors" in ours(ROOT / "msfp_gen" / "specification" / "layout.py", late=False)
     for name in ("derive", "specification.layout"):  # in a function, and for types
         module = name if "." in name else f"generator.{name}"
         assert f"msfp_gen.{module}" in ours(ROOT / "generator" / "__init__.py", late=True)
@@ -116,7 +116,7 @@ def test_no_modules_import_each_other_in_a_circle():
 
 def test_errors_and_version_are_leaves():
     for name in ("errors", "version"):
-        assert not ours(ROOT / "msfp_gen" / f"{name}.py", late=True)
+        assert not ours(ROOT / "msfp_gen" / "common" / f"{name}.py", late=True)
 
 
 def test_nothing_imports_the_command_line():
@@ -127,7 +127,7 @@ def test_nothing_imports_the_command_line():
 
 @pytest.mark.parametrize("path", GENERATOR, ids=lambda path: path.name)
 def test_generator_knows_little_of_the_package(path):
-    allowed = ("msfp_gen.specification", "msfp_gen.version", "msfp_gen.errors", "msfp_gen.generator")
+    allowed = ("msfp_gen.specification", "msfp_gen.common.version", "msfp_gen.common.errors", "msfp_gen.generator")
     assert all(name.startswith(allowed) for name in ours(path, late=True))
 
 
@@ -242,7 +242,7 @@ def test_runtime_includes_one_way(path):
     assert included and included <= below | generated
 
 
-FOLDERS_OF_C = ("runtime", "fmu/assets", "buildings/compiled", "studies/estimation/compiled")
+FOLDERS_OF_C = ("runtime", "embedding/assets/fmi", "buildings/compiled", "studies/estimation/compiled")
 FUNCTION = re.compile(r"^(?!.*\bstatic\b|MSFP_INLINE|typedef)\w[\w *]*?\b(\w+)\([^;{}]*\)\s*\{", flags=re.MULTILINE)
 
 

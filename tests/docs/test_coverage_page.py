@@ -58,7 +58,7 @@ def test_the_files_are_those_of_the_sources() -> None:
         for path in (ROOT / "msfp_gen").rglob("*.[ch]")
         if path.parent.name != "standard"
     }
-    assert written - set(counted) == {"msfp_gen/explorer/assets/explorer.c"}
+    assert written - set(counted) == {"msfp_gen/report/assets/explorer/explorer.c"}
     tests = [path for paths in line_coverage.TESTS for path in paths]
     assert tests and all((ROOT / path).exists() for path in tests)
 

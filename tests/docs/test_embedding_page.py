@@ -1,7 +1,7 @@
 """The worked examples of docs/embedding.md and docs/opensees.md, one problem, run and print what the pages say.
 
 Those in C and Fortran are files of an exported library (tests/unit/embedding); that of docs/fmu.md is in
-tests/unit/fmu.
+tests/unit/embedding.
 """
 
 from __future__ import annotations

@@ -12,9 +12,9 @@ from support.random_scenes import LAYOUTS, bearings, between, capacity, scenes
 from support.stacks import LOAD, PLANAR, a_pendulum, a_rig, a_stack, holds, nested_radii, pendulum_angle, swing
 
 from msfp_gen import Effects, Motion, RunError, Scene, Solver, simulate
-from msfp_gen.result import Result
 from msfp_gen.results.history import History
 from msfp_gen.scene.top import MassTop
+from msfp_gen.simulation.result import Result
 
 MASSLESS = Effects(dimension="planar", sliders="massless", bouc_wen="report")
 

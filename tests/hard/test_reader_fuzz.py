@@ -30,7 +30,7 @@ from msfp_gen import InputError, Motion, load_scene
 from msfp_gen.buildings.building import matrix_of
 from msfp_gen.motions import records
 from msfp_gen.motions.records.scaling import read_spectrum
-from msfp_gen.scene.file.suite import load_suite
+from msfp_gen.scene.file.loader import load_suite
 from msfp_gen.simulation import checkpoint
 from msfp_gen.studies import load_study, read_study, study_status
 from msfp_gen.studies.bounding.factors import factor_text, load_factors
@@ -53,8 +53,8 @@ ELSEWHERE = {
 OWN = {
     "common/inputs.py",
     "embedding/library.py",
-    "explorer/page.py",
-    "fmu/unit.py",
+    "report/explore.py",
+    "embedding/unit.py",
     "jit/compiler.py",
     "jit/prebuilt.py",
     "results/files.py",
@@ -187,6 +187,7 @@ READERS: dict[str, list[Reader]] = {
     "scene/file/loader.py": [
         Reader("scene.toml", (EXAMPLES / "triple.toml").read_bytes(), load_scene, toml),
         Reader("building.toml", (EXAMPLES / "building" / "building.toml").read_bytes(), load_scene, toml),
+        Reader("suite.toml", SUITE, load_suite, toml),
     ],
     "studies/study/loader.py": [Reader("study.toml", example_text().encode(), load_study, toml)],
     "studies/study/chunks.py": [Reader("study.toml", FOLDER, read_folder, toml)],
@@ -200,7 +201,6 @@ READERS: dict[str, list[Reader]] = {
         Reader("motion.csv", b"time [s],u1 [mm]\n0,1\n1,2\n2,3\n3,1\n", lambda path: Motion.from_csv(path).duration),
     ],
     "motions/records/scaling.py": [Reader("target.csv", SPECTRUM, lambda path: np.array(read_spectrum(path)))],
-    "scene/file/suite.py": [Reader("suite.toml", SUITE, load_suite, toml)],
     "studies/calibration/measurement.py": [
         Reader("test.csv", TEST.encode(), lambda path: read_measurement(path).force)
     ],

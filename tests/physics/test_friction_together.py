@@ -20,13 +20,12 @@ from support.resuming import assert_same, interrupted
 from msfp_gen import Auto, Effects, InputError, Scene, Surface, load_scene, simulate
 from msfp_gen.cli import main
 from msfp_gen.common.fields import Quantity, ruled_fields
-from msfp_gen.result import Result
 from msfp_gen.results.geometry import friction_circles, poses
 from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.simulation import simulate as simulation
+from msfp_gen.simulation.result import Result
 from msfp_gen.specification.formula import FUNCTIONS
-from msfp_gen.specification.friction_laws import BUILT_IN, VARIABLES, law_parameter_names
-from msfp_gen.specification.heat_kernel import HEAT_KERNEL
+from msfp_gen.specification.friction_laws import BUILT_IN, HEAT_KERNEL, VARIABLES, law_parameter_names
 from msfp_gen.studies.bounding import bounded_scenes, load_factors
 
 EXAMPLE, PAGE = ROOT / "examples" / "heating.toml", ROOT / "docs" / "friction.md"

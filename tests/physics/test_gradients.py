@@ -19,7 +19,7 @@ from msfp_gen.results.history import ENERGY
 from msfp_gen.results.row_unpacking import unpacked
 from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.parameters import Parameter, changed_parameters, parameters_of
-from msfp_gen.simulation.gradient_inputs import start_gradients
+from msfp_gen.simulation.gradients import start_gradients
 from msfp_gen.simulation.simulate import RunSequence
 
 STACK = (

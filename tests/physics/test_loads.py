@@ -13,13 +13,12 @@ from support import thinned
 
 from msfp_gen import Auto, Effects, InputError, Load, Motion, Rotation, Scene, Top, build_model, presets, simulate
 from msfp_gen.motions.piecewise import ORDER
-from msfp_gen.result import Result
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
+from msfp_gen.simulation.result import Result
 from msfp_gen.simulation.settling import needs_settling, settling_scene
 from msfp_gen.simulation.simulate import settle
 from msfp_gen.studies.accuracy.methods import run_library
-from msfp_gen.studies.accuracy.models import run_opensees
-from msfp_gen.studies.accuracy.series import run_series
+from msfp_gen.studies.accuracy.series import run_opensees, run_series
 
 STILL = Motion(np.array([0.0, 12.0]), np.zeros((1, 6, ORDER)))
 PUSH = Motion.harmonic(0.1, 0.1, cycles=2)

@@ -43,8 +43,7 @@ def test_every_method_has_its_order(name: str) -> None:
 
 def test_the_grid_has_every_effect() -> None:
     """Each value of each field of `Effects` that changes the equations, and each kind of top."""
-    from msfp_gen.specification.friction_laws import FRICTION
-    from msfp_gen.specification.hysteresis import HYSTERESIS
+    from msfp_gen.specification.friction_laws import FRICTION, HYSTERESIS
 
     cases = [*smooth().values(), *quasistatic().values()]
     have = {(name, value) for case in cases for name, value in vars(case.effects).items()}

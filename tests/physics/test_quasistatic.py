@@ -14,9 +14,9 @@ from support import scene_of
 
 from msfp_gen import Auto, Effects, Load, Motion, Scene, Top, presets, simulate
 from msfp_gen.buildings.explain import explain
-from msfp_gen.result import Result
 from msfp_gen.scene.effect_selection import damping_share, quasistatic
-from msfp_gen.specification.hysteresis import HYSTERESIS, Hysteresis
+from msfp_gen.simulation.result import Result
+from msfp_gen.specification.friction_laws import HYSTERESIS, Hysteresis
 
 PLANAR = Effects(dimension="planar", sliders="massless")
 TEST2 = scene_of("fenz-test2", {"dimension": "planar", "sliders": "massless"}, output_step=0.05)

@@ -7,8 +7,8 @@ import pytest
 from support.flights import UPLIFT, G, shaken
 
 from msfp_gen import Effects, Load, Motion, RunError, Scene, Top, build_model, load_scene, presets, simulate
-from msfp_gen.errors import InputError
-from msfp_gen.scene.seats import seat_stiffness
+from msfp_gen.common.errors import InputError
+from msfp_gen.scene.standing import seat_stiffness
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,7 @@ def test_energy_through_landings(flight):
 
 
 def test_without_the_effect_such_a_run_is_refused_by_name():
-    from msfp_gen.errors import RunError
+    from msfp_gen.common.errors import RunError
 
     with pytest.raises(RunError) as caught:
         simulate(shaken(1.4, effects=replace(UPLIFT, uplift=False)))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from msfp_gen.generator.header import public_header
+from msfp_gen.generator.interface import public_header
 
 Array = np.ndarray
 _PLAIN: dict[str, Any] = {

@@ -10,7 +10,7 @@ from threading import Thread
 import numpy as np
 
 from msfp_gen import TwoPort
-from msfp_gen.coupling.server import Server
+from msfp_gen.embedding.server import Server
 from support import Array
 
 SIZE = 256  # numbers of a message

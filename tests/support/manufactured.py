@@ -24,7 +24,7 @@ from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.scene import top as scene_top
 from msfp_gen.scene.friction_parameters import law_parameters
 from msfp_gen.scene.top import MassTop, is_sprung, load_values
-from msfp_gen.specification.heat_kernel import HEAT_KERNEL
+from msfp_gen.specification.friction_laws import HEAT_KERNEL
 from support import Array
 
 LOAD = 1e5  # around which the sources are found, downwards [N]

@@ -8,7 +8,7 @@ from importlib.resources import files
 from os import PathLike
 from pathlib import Path
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.motions.records import cosmos, csmip, csv_table, knet, peer
 from msfp_gen.motions.records.channel import Channel, assemble_record
 from msfp_gen.motions.records.correction import Corrected, baseline_corrected, strong_window, uncorrected

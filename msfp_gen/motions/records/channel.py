@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.motions.records.record import UNITS, Record, common_window, derived_note, differentiated, stem
 from msfp_gen.motions.records.text import Lines
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite, positive
 from msfp_gen.motions.piecewise import evaluate, from_rates
 from msfp_gen.motions.records.record import Record, sample_times

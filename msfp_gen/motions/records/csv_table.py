@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import check_output, replacing
-from msfp_gen.errors import InputError
 from msfp_gen.motions.records.record import Record, common_window, derived_note, differentiated, stem
 from msfp_gen.motions.records.text import Lines, column, read_lines
 
@@ -123,7 +123,7 @@ def _table(lines: Lines) -> Table:
 
 def _columns(lines: Lines, head: int, header: str) -> tuple[list[str], list[str], list[float]]:
     """Names, units and factors to SI of the columns; `head` is the index of the line of the header."""
-    from msfp_gen.common.quantities import to_si
+    from msfp_gen.common.fields import to_si
 
     matches = [COLUMN.fullmatch(c) for c in header.split(",")]
     for text, match in zip(header.split(","), matches, strict=True):

@@ -7,7 +7,7 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.motions.records.channel import DOWN, QUANTITIES, UNKNOWN, UP, Channel, assemble_record, si_factor
 from msfp_gen.motions.records.record import Record, stem
 from msfp_gen.motions.records.text import Lines, column, read_lines

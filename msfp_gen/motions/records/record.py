@@ -11,7 +11,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.elementary import cos, sin
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite, positive
 
 G = 9.80665  # standard gravity [m/s^2], the unit g of records, independent of the gravity of a bearing

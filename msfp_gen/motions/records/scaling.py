@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.fields import Quantity, Text, check_fields, require_type, ruled_fields
-from msfp_gen.common.quantities import to_si
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
+from msfp_gen.common.fields import Quantity, Text, check_fields, require_type, ruled_fields, to_si
 from msfp_gen.motions.checks import finite, positive
 from msfp_gen.motions.records.correction import Corrected, baseline_corrected, uncorrected
 from msfp_gen.motions.records.csv_table import COLUMN, first_line

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import check_output, replacing
-from msfp_gen.errors import InputError
 from msfp_gen.motions.checks import finite
 from msfp_gen.motions.records.correction import Corrected
 from msfp_gen.motions.records.record import COMPONENTS, Record

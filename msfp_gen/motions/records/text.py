@@ -13,8 +13,8 @@ from typing import NoReturn
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.inputs import read_input
-from msfp_gen.errors import InputError
 
 _WORD = re.compile(r"\S+")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")

@@ -9,8 +9,8 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Any
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Rule
-from msfp_gen.errors import InputError
 
 Table = dict[str, Any]
 KINDS = ("bearing", "scene", "building")

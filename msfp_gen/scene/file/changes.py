@@ -7,8 +7,8 @@ from collections.abc import Collection, Iterator, Mapping
 from copy import copy, deepcopy
 from typing import Any, NamedTuple
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, ruled_fields
-from msfp_gen.errors import InputError
 from msfp_gen.scene.bearing import Body, Surface
 from msfp_gen.scene.file.loader import MAX_DEPTH, complete_bearing, complete_part
 

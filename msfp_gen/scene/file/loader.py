@@ -1,31 +1,46 @@
-"""Reading and writing of scene files (TOML). A file is data: nothing in it is evaluated."""
+"""Reading and writing of scene files (TOML), and of suites of ground motions. A file is data: nothing is evaluated.
+
+A suite lists records, and how they are scaled to a mean spectrum (docs/data.md).
+"""
 
 from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import errors_at, ruled_fields
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Kept, is_input, read_input
-from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.file import catalogue, schema
-from msfp_gen.scene.file.motion_tables import LOADS, ROTATIONS, Pieces, history_from, located, motion_from, table_of
-from msfp_gen.scene.limits import Limits
+from msfp_gen.scene.file.motion_tables import (
+    LOADS,
+    ROTATIONS,
+    Pieces,
+    RecordMotion,
+    history_from,
+    located,
+    motion_from,
+    table_of,
+    with_spectrum,
+)
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.scene_fields import InitialState, Stop
+from msfp_gen.scene.scene_fields import InitialState, Limits, Stop
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, Top
 from msfp_gen.specification.layout import SELECTABLE, Auto, Effects, Layout
+
+if TYPE_CHECKING:
+    from msfp_gen.motions.records import ScaledSuite
 
 Table = dict[str, Any]
 MAX_DEPTH = 16  # of nested tables and lists; a scene has six
@@ -255,3 +270,83 @@ _PARTS: dict[str, Callable[[Table], Any]] = {
     "load": lambda table: history_from(LOADS, table, "load"),
     "top_rotation": lambda table: history_from(ROTATIONS, table, "top_rotation"),
 }
+
+
+@dataclass(frozen=True)
+class SuiteRecord:
+    """A motion of a suite: its name, its `[motion]` table, from which a result file describes it, and the motion."""
+
+    name: str
+    table: Table
+    motion: Motion
+
+
+@dataclass(frozen=True)
+class Suite:
+    """The motions of a suite; scaled: their spectra, where the suite is scaled to a mean spectrum."""
+
+    records: tuple[SuiteRecord, ...]
+    scaled: ScaledSuite | None
+
+
+def load_suite(path: str | Path, progress: Callable[[float, float], None] | None = None) -> Suite:
+    """The suite in a TOML file; paths inside it are relative to it, and permitted as in a scene file.
+
+    progress: called with the number of spectra computed and of all. Raises InputError of one line that names the file,
+    the path of the field, the value and the remedy.
+    """
+    path = Path(path)
+    if not is_input(path):
+        raise InputError(f"suite = {str(path)!r}: no such file; give the path of a TOML file with [[records]]")
+    try:
+        return suite_from_table(toml_file(path), path.parent, progress)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def suite_from_table(
+    table: Table, folder: Path | None, progress: Callable[[float, float], None] | None = None
+) -> Suite:
+    """The suite of a plain table, as in a suite file. folder: as of `scene_from_table`. Raises InputError."""
+    valid = schema.validate_suite(table)
+    if not valid["records"]:
+        raise InputError("records = []: give at least one [[records]]")
+    tables = [_located(record, folder, index) for index, record in enumerate(valid["records"])]
+    target = valid.get("scale_to")
+    return _suite(tables, target and with_spectrum(target, folder, "scale_to"), progress)
+
+
+def _located(table: Table, folder: Path | None, index: int) -> Table:
+    """The table of a record with absolute paths."""
+    with errors_at("motion", f"records[{index}]"):
+        return located(table, folder)
+
+
+def _suite(tables: list[Table], target: Table | None, progress: Callable[[float, float], None] | None) -> Suite:
+    if target is None:
+        return Suite(_records(tables), None)
+    from msfp_gen.motions.records import ScaleTo, scaled_suite
+
+    for index, table in enumerate(tables):
+        if own := [name for name in ("scale", "scale_to") if name in table]:
+            raise InputError(f"records[{index}].{own[0]}: [scale_to] scales all records of the suite; leave one out")
+    values = dict(target)
+    share = values.pop("least_share", None)
+    scaled = scaled_suite([record.motion for record in _records(tables)], ScaleTo(**values), share, progress)
+    factors = scaled.factors.tolist()
+    return Suite(_records([{**table, "scale": f} for table, f in zip(tables, factors, strict=True)]), scaled)
+
+
+def _records(tables: list[Table]) -> tuple[SuiteRecord, ...]:
+    records = []
+    for index, table in enumerate(tables):
+        try:
+            motion = RecordMotion(**table).build()
+        except InputError as error:
+            raise InputError(f"records[{index}].{str(error).removeprefix('motion').lstrip('.: ')}") from None
+        records.append(SuiteRecord(motion.name, table, motion))
+    names = [record.name for record in records]
+    return tuple(
+        replace(record, name=f"{record.name}-{index}") if names.count(record.name) > 1 else record
+        for index, record in enumerate(records, start=1)
+    )

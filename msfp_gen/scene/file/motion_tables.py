@@ -12,10 +12,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Notes, Quantity, Text, ruled_fields
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Kept, digest_of, expecting, is_input
-from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load, Prescribed, Rotation
 

@@ -25,16 +25,15 @@ from pydantic import (
     create_model,
 )
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, Rule, Text, ruled_fields
-from msfp_gen.errors import InputError
 from msfp_gen.motions.records.scaling import ScaleTo
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.file import motion_tables
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.scene.file.motion_tables import LOADS, ROTATIONS
-from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.scene_fields import InitialState, Stop
+from msfp_gen.scene.scene_fields import InitialState, Limits, Stop
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Auto, Layout

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Notes
-from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import CHANNELS, Motion
 from msfp_gen.scene.file.loader import scene_text
 from msfp_gen.scene.file.motion_tables import Pieces, motion_from

@@ -14,8 +14,8 @@ from dataclasses import asdict, dataclass, replace
 from math import pi
 from typing import TYPE_CHECKING, Any, Final, cast
 
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.tables import Table
-from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_selection import slider_period
 from msfp_gen.scene.effect_switching import all_effects
@@ -25,9 +25,9 @@ from msfp_gen.specification.layout import Auto, Effects
 from msfp_gen.studies.accuracy.timed_run import CUT_OFF, Attempt, Trial, dopri5_cost, errors, largest_error, run_native
 
 if TYPE_CHECKING:
-    from msfp_gen.result import Result
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
+    from msfp_gen.simulation.result import Result
 
 AFTER_IMPACTS = ", and after impacts,"
 CANDIDATE_TOLERANCES = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21))  # 1e-2, 3e-3, 1e-3 ... 1e-10
@@ -205,7 +205,7 @@ class _Search:
     def solver(self, index: int) -> Solver:
         """Solver options at a candidate tolerance."""
         tolerance = CANDIDATE_TOLERANCES[index]
-        return replace(self.scene.solver, method=cast(Any, self.method), rtol=tolerance, atol_angle=None)
+        return replace(self.scene.solver, method=cast("Any", self.method), rtol=tolerance, atol_angle=None)
 
     def trial(self, index: int) -> Trial:
         """The run at a candidate tolerance. Raises RunError when the budget is used up."""

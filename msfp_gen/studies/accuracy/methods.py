@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.studies.accuracy.timed_run import (
     CUT_OFF,
@@ -25,7 +25,7 @@ from msfp_gen.studies.accuracy.timed_run import (
 )
 
 if TYPE_CHECKING:
-    from msfp_gen.model.ode import Ode
+    from msfp_gen.model.model import Ode
     from msfp_gen.scene.scene import Scene
 
 FIRST_STEP = 1e-4  # [s], as in the runtime; the first step that some integrators choose leaves the model's range

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.studies.accuracy.methods import METHODS
-from msfp_gen.studies.accuracy.opensees import run_opensees
-from msfp_gen.studies.accuracy.series import run_series
+from msfp_gen.studies.accuracy.series import run_opensees, run_series
 from msfp_gen.studies.accuracy.study import (
     LIMIT,
     Say,

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.results.history import Counters
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.batch import OUT_OF_TIME, run_to_end
 
 if TYPE_CHECKING:
-    from msfp_gen.result import Result
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.simulation.result import Result
 
 ERRORS = {
     "force_max": "top force, maximum",
@@ -225,7 +225,7 @@ def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int 
     repeats: how often a run shorter than QUICK is repeated for its time; 0: not. Raises InputError if the method cannot
     run the scene.
     """
-    solver = replace(scene.solver, method=cast(Any, name), rtol=rtol, atol_angle=None)
+    solver = replace(scene.solver, method=cast("Any", name), rtol=rtol, atol_angle=None)
     compared = replace(scene, solver=solver, output_step=scene.end / ROWS)
     result, status, message = _run_limited(compared, limit)
     if result is None:

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.errors import InputError
 from msfp_gen.studies.assessment.rows import complete, demands, intensities, unit_of, unknown_column
 
 ITERATIONS = 100

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.errors import InputError
 from msfp_gen.studies.assessment.rows import STATISTICS, complete, numbers, read_study, unknown_column, write_frame
 from msfp_gen.studies.pool import Pool, pool_from, require
+from msfp_gen.studies.study.axes import Sampling, values_at
 from msfp_gen.studies.study.definition import Study
 from msfp_gen.studies.study.loader import load_study
 from msfp_gen.studies.study.run import run_on
-from msfp_gen.studies.study.sampling import Sampling, values_at
 
 LARGEST = 1e30  # objective of a design that is not feasible, so that every feasible one is better
 DESIGNS = "designs.parquet"

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import write_columns
-from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.studies.study.chunks import parts_in, readable_parts, study_table
 

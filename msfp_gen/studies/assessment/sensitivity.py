@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.errors import InputError
 from msfp_gen.studies.assessment.rows import by_sample
 from msfp_gen.studies.pool import require
-from msfp_gen.studies.study.sampling import Sampling
+from msfp_gen.studies.study.axes import Sampling
 
 
 @dataclass(frozen=True)

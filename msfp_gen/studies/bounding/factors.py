@@ -9,9 +9,9 @@ from math import prod
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, Text
 from msfp_gen.common.inputs import is_input
-from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import known_keys, parsed, suggestion
 from msfp_gen.scene.file.loader import toml_file, toml_table
 

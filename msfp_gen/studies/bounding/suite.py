@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import RunError
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_columns
-from msfp_gen.errors import RunError
 from msfp_gen.figures.style import INK, distinct, headline, page, plain
 from msfp_gen.scene.scene import Scene
 from msfp_gen.studies.bounding.factors import FactorTable
-from msfp_gen.studies.bounding.output import shown_as
-from msfp_gen.studies.bounding.runs import CASES, Progress, bound
+from msfp_gen.studies.bounding.runs import CASES, Progress, bound, shown_as
 from msfp_gen.studies.columns import Counts, Source, catalogue
 
 if TYPE_CHECKING:

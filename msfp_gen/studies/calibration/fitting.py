@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.studies.calibration.fit_result import Estimate, Fit
 from msfp_gen.studies.calibration.intervals import Identified, Spread, identified, lag_one, noise_of, spread_of, weak
 from msfp_gen.studies.calibration.measurement import FittedTest, Measurement, read_measurement

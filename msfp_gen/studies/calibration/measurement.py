@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.quantities import to_si
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
+from msfp_gen.common.fields import to_si
 from msfp_gen.motions.checks import finite
 from msfp_gen.motions.records.text import Lines, read_lines
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.cores import usable_cores
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.parameters import Parameter, changed_parameters, parameters_of

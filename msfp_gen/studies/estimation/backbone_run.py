@@ -15,9 +15,9 @@ import numpy as np
 
 from msfp_gen.buildings.fidelity import load_shares
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError
-from msfp_gen.jit.driver import load_driver
-from msfp_gen.scene.backbone import Backbone
+from msfp_gen.common.errors import InputError
+from msfp_gen.jit.build import load_driver
+from msfp_gen.scene.fidelity import Backbone
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import MassTop
 

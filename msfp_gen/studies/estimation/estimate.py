@@ -12,9 +12,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.fields import Choice, Quantity, check_fields
-from msfp_gen.common.quantities import to_si
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
+from msfp_gen.common.fields import Choice, Quantity, check_fields, to_si
 from msfp_gen.studies.estimation.allocation import EXACT, best_chain, factor_for, optimal_runs
 from msfp_gen.studies.estimation.crossing import crossings
 from msfp_gen.studies.estimation.estimators import (

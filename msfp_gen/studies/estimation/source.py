@@ -14,19 +14,18 @@ from typing import Protocol
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.specification import formula
 from msfp_gen.studies.assessment.rows import numbers, read_study
+from msfp_gen.studies.columns import Keep
 from msfp_gen.studies.estimation.allocation import EXACT
 from msfp_gen.studies.estimation.backbone_run import OF_SURFACES, QUANTITIES, check_backbone
 from msfp_gen.studies.estimation.estimators import Flags, Indices
 from msfp_gen.studies.pool import Pool
-from msfp_gen.studies.study.axes import SceneFactory
+from msfp_gen.studies.study.axes import Sampling, SceneFactory, values_at
 from msfp_gen.studies.study.chunks import STUDY_FILE, parts_in, readable_parts, study_table
 from msfp_gen.studies.study.definition import Study
-from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.run import run_on
-from msfp_gen.studies.study.sampling import Sampling, values_at
 
 BLOCK = 1024  # draws that are made together
 CHUNKS = {EXACT: 4, "backbone": 64}  # runs of a part; of other models

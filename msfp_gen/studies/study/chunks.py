@@ -19,14 +19,14 @@ from typing import Any
 
 import numpy as np
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import clear_all_leftovers, write_bytes
 from msfp_gen.common.tables import Table
-from msfp_gen.errors import InputError
+from msfp_gen.common.version import __version__
 from msfp_gen.jit.cache import digest_sources
 from msfp_gen.scene.file.loader import dumps, toml_file
 from msfp_gen.studies.study.definition import Study, Task
-from msfp_gen.version import __version__
 
 FORMAT = 1  # of the rows of a part
 STUDY_FILE = "study.toml"

@@ -14,17 +14,15 @@ from msfp_gen.buildings import dataset as building_dataset
 from msfp_gen.buildings.file import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, check_fields
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Files, expecting, recording
-from msfp_gen.errors import InputError
 from msfp_gen.results import dataset
 from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.studies.batch import check_method
-from msfp_gen.studies.columns import Counts
-from msfp_gen.studies.study.axes import INTENSITY, Axis, Recipe, SceneFactory
-from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.sampling import Distribution, Sampling
+from msfp_gen.studies.columns import Counts, Keep
+from msfp_gen.studies.study.axes import INTENSITY, Axis, Distribution, Recipe, Sampling, SceneFactory
 
 MOST_RUNS = 100_000_000
 

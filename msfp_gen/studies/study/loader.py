@@ -9,17 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from msfp_gen.buildings.file import with_absolute_paths
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Choice, Quantity, check_fields, ruled_fields
 from msfp_gen.common.inputs import is_input, recording
-from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import known_keys, parsed
-from msfp_gen.scene.file.loader import scene_table, toml_file
-from msfp_gen.scene.file.suite import Suite, load_suite, suite_from_table
+from msfp_gen.scene.file.loader import Suite, load_suite, scene_table, suite_from_table, toml_file
 from msfp_gen.studies.bounding import load_factors
-from msfp_gen.studies.study.axes import INTENSITY, Axis, Recipe, axis_from, grid, located, motion_of
+from msfp_gen.studies.columns import Keep
+from msfp_gen.studies.study.axes import INTENSITY, Axis, Recipe, Sampling, axis_from, grid, located, motion_of
 from msfp_gen.studies.study.definition import Limits, Study, check_study
-from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.sampling import Sampling
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion

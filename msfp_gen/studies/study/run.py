@@ -9,17 +9,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.inputs import Files, expecting
 from msfp_gen.common.output import make_folder, write_bytes
 from msfp_gen.common.tables import parquet_bytes
-from msfp_gen.errors import InputError, RunError
 from msfp_gen.studies.batch import BAD_INPUT, ENDED, OUT_OF_TIME, build_models, check_method, run_to_end
+from msfp_gen.studies.columns import Column, Keep
 from msfp_gen.studies.pool import Pool, pool_from
 from msfp_gen.studies.study.axes import INTENSITY, Recipe, SceneFactory
 from msfp_gen.studies.study.chunks import Chunks, chunks_in, failures, parts_in
 from msfp_gen.studies.study.definition import Study, Task
 from msfp_gen.studies.study.loader import load_study
-from msfp_gen.studies.study.quantities import Column, Keep
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.file import AnyScene

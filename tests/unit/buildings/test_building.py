@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 
 from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.storey import FREEDOMS, BaseSlab, Storey, rigid
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 
 MASS, STIFFNESS, HEIGHT = 2e5, 3e8, 3.5
 BASE = BaseSlab(3e5, (4e6, 6e6, 9e6))

@@ -14,9 +14,8 @@ from support.synthetic import loops as loops_of_one
 from support.synthetic import opened
 
 from msfp_gen import Effects, InputError, RunError, Solver, characterise, simulate
-from msfp_gen.analysis.characterise.characterisation import csv_rows
-from msfp_gen.analysis.characterise.loops import Path as Motions
-from msfp_gen.analysis.characterise.report import characterised
+from msfp_gen.analysis.characterise import characterised, csv_rows
+from msfp_gen.analysis.loops import ForcePath as Motions
 from msfp_gen.analysis.summary import summary_of_bearing
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import plot_loops, plot_orbit, plot_result, plot_sliding

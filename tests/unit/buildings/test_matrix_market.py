@@ -9,7 +9,7 @@ import pytest
 from scipy.io import mmread, mmwrite
 from scipy.sparse import coo_array
 
-from msfp_gen.buildings.matrix_market import read_matrix
+from msfp_gen.buildings.building import read_matrix
 
 GENERAL = np.array([[2.0, -0.5, 0.0], [1e-7, 3.0, 1 / 3], [0.0, 0.25, -1.5]])
 HEAD = "%%MatrixMarket matrix coordinate real symmetric\n"

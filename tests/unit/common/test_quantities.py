@@ -4,8 +4,7 @@ import sys
 
 import pytest
 
-from msfp_gen.common.fields import Quantity
-from msfp_gen.common.quantities import to_si
+from msfp_gen.common.fields import Quantity, to_si
 
 
 @pytest.mark.parametrize(
@@ -93,7 +92,7 @@ def test_numpy_numbers_and_arrays_are_numbers():
 def test_pint_is_imported_only_for_a_unit():
     code = (
         "import sys; from msfp_gen.scene.file.presets import scene; scene('fenz-test1'); print('pint' in sys.modules);"
-        "from msfp_gen.common.quantities import to_si; to_si('1 mm', 'm'); print('pint' in sys.modules)"
+        "from msfp_gen.common.fields import to_si; to_si('1 mm', 'm'); print('pint' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "True"]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from msfp_gen import Effects, InputError, Layout
-from msfp_gen.embedding import README, write_guide
+from msfp_gen.embedding.library import README, write_guide
 from msfp_gen.specification.layout import ModelSpec
 
 

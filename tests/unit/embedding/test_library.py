@@ -28,8 +28,9 @@ from msfp_gen import (
     load_scene,
     simulate,
 )
-from msfp_gen.embedding import export_library, values
-from msfp_gen.errors import CompileError
+from msfp_gen.common.errors import CompileError
+from msfp_gen.embedding import values
+from msfp_gen.embedding.library import export_library
 from msfp_gen.generator.interface import ABI_VERSION, model_name
 from msfp_gen.jit.compiler import find_compiler
 from msfp_gen.jit.library import BuiltLibrary, Platform

@@ -17,7 +17,7 @@ import pytest
 from support.replay import REPLAY, inputs
 
 from msfp_gen import Scene, build_model, cli, load_scene
-from msfp_gen.errors import CompileError
+from msfp_gen.common.errors import CompileError
 from msfp_gen.jit import library as platforms
 from msfp_gen.simulation.segment import start_run
 

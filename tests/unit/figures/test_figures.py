@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.synthetic import LOAD, loops, ramp
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.figures import plot_result
 from msfp_gen.scene.top import Top
 

@@ -10,7 +10,7 @@ import pytest
 from support import preset_run
 from support.films import drawn_twice
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.figures import animate, movie, page
 
 SHORT = {"seconds": 0.5, "frames_per_second": 6}

@@ -10,7 +10,7 @@ import pytest
 from support import preset_run
 from support.synthetic import loops
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.figures import FIGURES, engineering, plot_energy, plot_force_path, plot_section, plot_stages
 from msfp_gen.figures.bearing import eccentricity
 from msfp_gen.figures.section import peak_time

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import thinned
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.figures import plot_correction, plot_response_spectrum, plot_work_precision
 from msfp_gen.motions.records import Record, baseline_corrected, uncorrected
 

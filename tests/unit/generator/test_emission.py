@@ -11,11 +11,11 @@ from support import thinned
 from support.emitted_c import emitted, text, warnings_of
 
 from msfp_gen import Effects, InputError, Layout
+from msfp_gen.common.version import __version__
 from msfp_gen.generator import generate
 from msfp_gen.generator.emit import FILES, TWO_PORT_FILES
 from msfp_gen.jit.compiler import FLAGS
 from msfp_gen.specification.layout import ModelSpec
-from msfp_gen.version import __version__
 
 CHOICES: dict[str, tuple[object, ...]] = {
     "dimension": ("spatial", "planar"),

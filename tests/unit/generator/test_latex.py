@@ -9,10 +9,9 @@ import sympy as sp
 from support import ROOT
 
 from msfp_gen import Bearing, Body, Effects, Layout, Surface, build_model
-from msfp_gen.generator.assembled import assembled, assembled_latex, over_level_base, readable
 from msfp_gen.generator.derive import derive
 from msfp_gen.generator.functions import Step
-from msfp_gen.generator.latex import PLACES, statements
+from msfp_gen.generator.latex import PLACES, assembled, assembled_latex, over_level_base, readable, statements
 from msfp_gen.specification.layout import ModelSpec
 
 

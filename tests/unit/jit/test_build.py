@@ -16,7 +16,7 @@ import pytest
 from support import fake_model
 from support.fake_model import run_child
 
-from msfp_gen.errors import CompileError, InputError
+from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.jit import build, cache, compiler
 from msfp_gen.model import model
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec

@@ -18,7 +18,7 @@ from support import fake_model
 from support.fake_model import run_child
 
 from msfp_gen.cli import main
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.jit import build, cache, compiler
 from msfp_gen.specification.layout import Layout, ModelSpec
 

@@ -15,10 +15,10 @@ import pytest
 from support import ROOT, Array
 
 from msfp_gen import Effects, Layout, Motion, Scene, Solver, Top, build_model, cli, presets, simulate
-from msfp_gen.embedding import README
+from msfp_gen.embedding.library import README
 from msfp_gen.jit.compiler import FLAGS, find_compiler, x86_64_level
 from msfp_gen.motions.piecewise import hermite5
-from msfp_gen.specification import contract, rows
+from msfp_gen.specification import contract
 
 LOAD = 112e3
 REPORT = Effects(bouc_wen="report")  # that of main.c
@@ -106,7 +106,7 @@ def test_readme_names_every_file_value_and_status(folder: Path) -> None:
     files = {path.name for path in folder.iterdir()} - {README}
     assert {name for name in files if not name.endswith((".so", ".pyd"))} <= named
     assert {name for name in named if name.endswith((".c", ".h", ".pyx"))} <= files
-    for entries in (contract.BODY, contract.SURFACE, contract.TOP, rows.row(REPORT), contract.EVENT_KINDS):
+    for entries in (contract.BODY, contract.SURFACE, contract.TOP, contract.row(REPORT), contract.EVENT_KINDS):
         for entry in entries:
             assert entry.meaning in text, entry.name
     assert {status.name for status in contract.STATUSES if status.compiled} <= named

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from support import ROOT, fake_model
 
-from msfp_gen.errors import CompileError, InputError
+from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.jit import build, cache, compiler, doctor
 from msfp_gen.jit.compiler import FORBIDDEN, words
 from msfp_gen.specification.layout import Layout, ModelSpec

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support import fake_model
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.jit import build, cache, compiler, doctor, prebuilt
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 

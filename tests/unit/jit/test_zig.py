@@ -13,7 +13,7 @@ import pytest
 from support import ROOT
 
 from msfp_gen import load_scene, simulate
-from msfp_gen.errors import CompileError
+from msfp_gen.common.errors import CompileError
 from msfp_gen.jit import compiler
 
 needs_zig = pytest.mark.skipif(

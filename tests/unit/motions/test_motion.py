@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.motions import piecewise
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from msfp_gen import Effects, Load, Motion, Rotation, RunError, Scene, Solver, Top, presets, simulate
 from msfp_gen.motions.piecewise import ORDER, hermite5
 from msfp_gen.motions.time_grid import TIME_TOLERANCE, Resolution, TimeGrid, distinct_times, snapped
-from msfp_gen.result import Result
+from msfp_gen.simulation.result import Result
 from msfp_gen.simulation.segment import time_grid
 
 PLANAR = Effects(dimension="planar", sliders="massless")

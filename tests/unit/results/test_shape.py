@@ -12,7 +12,7 @@ from reference.kinematics import points as reference_points
 from reference.kinematics import rotation
 from support import bearing_of, preset_run
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.results.geometry import (
     Plane,
     azimuth_of,

@@ -10,7 +10,7 @@ import pytest
 from support import ROOT, scene_of
 
 from msfp_gen import Effects, Load, Motion, Scene, Solver, Top, load_scene, presets, simulate
-from msfp_gen.errors import RunError
+from msfp_gen.common.errors import RunError
 from msfp_gen.motions.piecewise import ORDER
 
 SOURCE = (ROOT / "msfp_gen" / "runtime" / "steppers" / "tableaux.c").read_text(encoding="utf-8")

@@ -5,7 +5,7 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, Top

@@ -29,8 +29,7 @@ from msfp_gen import (
 from msfp_gen.model.model import build_model
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.scene.parameters import parameters_of
-from msfp_gen.simulation.gradient_inputs import start_gradients
-from msfp_gen.simulation.gradients import measured_errors, with_gradient_errors
+from msfp_gen.simulation.gradients import measured_errors, start_gradients, with_gradient_errors
 from msfp_gen.simulation.simulate import RunSequence
 
 PATHS = ("bearing.surfaces[*].friction", "top.axial_load", "motion.scale")

@@ -16,7 +16,6 @@ from support.resuming import assert_same, interrupted, stopping_at
 
 from msfp_gen import Auto, InputError, Load, Motion, RunError, Scene, Top, load_scene, presets, simulate
 from msfp_gen.cli import main
-from msfp_gen.result import Result
 from msfp_gen.results import joining
 from msfp_gen.results.joining import thinned_history
 from msfp_gen.scene.file.loader import scene_text
@@ -24,6 +23,7 @@ from msfp_gen.scene.scene_fields import Stop
 from msfp_gen.simulation import memory, streamed_rows
 from msfp_gen.simulation import simulate as simulation
 from msfp_gen.simulation.checkpoint import Checkpoint
+from msfp_gen.simulation.result import Result
 from msfp_gen.simulation.row_file import RowFile
 
 CLOCK = ("counter_wall_time", "provenance_build_seconds", "digest")
@@ -285,7 +285,7 @@ def test_a_disk_that_fills_while_rows_are_written(tmp_path: Path, monkeypatch: p
 FULL = """
 import resource, sys
 from pathlib import Path
-from msfp_gen.result import Result
+from msfp_gen.simulation.result import Result
 from msfp_gen.results.joining import blocks, taken
 from msfp_gen.simulation.streamed_rows import write_blocks
 path = Path(sys.argv[1])

@@ -14,7 +14,7 @@ from support.emitted_c import text
 from msfp_gen import Effects, Solver, Surface
 from msfp_gen.model.evaluation import FAILURES
 from msfp_gen.results.history import ENERGY, Counters, Event
-from msfp_gen.specification import contract, rows
+from msfp_gen.specification import contract
 from msfp_gen.specification.contract import names
 
 PAGE = ROOT / "docs" / "glossary.md"
@@ -60,7 +60,7 @@ def test_header_lays_out_values_and_rows_in_order(effects: dict[str, object]) ->
         (block,) = re.findall(rf"^/\* {kind}_values \*/\nenum \{{\n(.*?)^\}};", header, re.DOTALL | re.MULTILINE)
         expected = [(f"MSFP_{kind}_VALUES_{name}".upper(), str(i)) for i, name in enumerate((*columns, "size"))]
         assert re.findall(r"^    (\w+) = (\d+)", block, re.MULTILINE) == expected
-    row = [quantity.name for quantity in rows.row(given)]
+    row = [quantity.name for quantity in contract.row(given)]
     assert enum(header, "row_field") == [*(f"MSFP_ROW_{name.upper()}" for name in row), "MSFP_ROW_SIZE"]
     asserted = re.findall(r"^MSFP_STATIC_ASSERT\(offsetof\(msfp_row, (\w+)\)", header, flags=re.MULTILINE)
     assert asserted == row and "MSFP_STATIC_ASSERT(sizeof(msfp_row) ==" in header
@@ -71,7 +71,7 @@ def test_compiled_module_has_the_tables() -> None:
     effects = Effects()
     assert (names(contract.BODY), names(contract.TOP)) == (extension.BODY_VALUES, extension.TOP_VALUES)
     assert contract.surface_values(effects) == extension.SURFACE_VALUES
-    assert [name for name, _ in extension.ROW] == [quantity.name for quantity in rows.row(effects)]
+    assert [name for name, _ in extension.ROW] == [quantity.name for quantity in contract.row(effects)]
     assert dict(extension.ROW)["q"] == (4, 3) and dict(extension.ROW)["work"] == (len(contract.WORKS),)
     assert sum(int(np.prod(shape)) for _, shape in extension.ROW) == extension.ROW_SIZE
     assert names(contract.EVENT_KINDS) == extension.EVENT_KINDS and names(contract.COUNTERS) == extension.COUNTS

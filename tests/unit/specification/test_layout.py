@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 

@@ -34,8 +34,7 @@ from msfp_gen import (
 from msfp_gen.cli import main
 from msfp_gen.figures.style import COLOURS, distinct
 from msfp_gen.studies.bounding import CASES, Bounds, bound, bounded_scenes, factor_tables, load_factors
-from msfp_gen.studies.bounding.output import plot_bounds
-from msfp_gen.studies.bounding.runs import _scaled
+from msfp_gen.studies.bounding.runs import _scaled, plot_bounds
 from msfp_gen.studies.bounding.suite import _quantities
 
 ASCE = ((1 + 0.75 * 0) * 0.7 * 0.85, (1 + 0.75 * (1.3 * 1.2 - 1)) * 1.3 * 1.15)

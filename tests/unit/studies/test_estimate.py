@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 from msfp_gen import Effects, InputError, Motion, load_scene
 from msfp_gen.buildings.file import reduced
-from msfp_gen.scene.backbone import Backbone
+from msfp_gen.scene.fidelity import Backbone
 from msfp_gen.scene.file.loader import bearing_from_table
 from msfp_gen.studies import estimate, fragility, ida, read_study
 from msfp_gen.studies.batch import run_to_end

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import Array
 
-from msfp_gen.errors import RunError
+from msfp_gen.common.errors import RunError
 from msfp_gen.studies.calibration.fitting import LEAST, SMALL, Solution, least_squares, solve
 from msfp_gen.studies.calibration.intervals import identified, lag_one, noise_of, spread_of
 from msfp_gen.studies.calibration.residuals import Evaluation

@@ -255,7 +255,7 @@ def test_sobol_indices_are_those_of_ishigami(tmp_path: Path, monkeypatch: pytest
     """The rows of the sampling, in the order that SALib analyses; the function has known indices."""
     pytest.importorskip("SALib")
     from msfp_gen.studies.assessment import sensitivity
-    from msfp_gen.studies.study.sampling import Sampling
+    from msfp_gen.studies.study.axes import Sampling
 
     shares = Sampling("sobol-indices", 4096, seed=1).shares(3)
     x = np.pi * (2 * shares - 1)

@@ -19,10 +19,9 @@ from msfp_gen.motions.records.spectrum import MEASURES
 from msfp_gen.scene.file.loader import scene_from_table, toml_file
 from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.studies import load_study
-from msfp_gen.studies.columns import Counts, catalogue
+from msfp_gen.studies.columns import Counts, Keep, catalogue
+from msfp_gen.studies.study.axes import METHODS, Distribution, Sampling
 from msfp_gen.studies.study.loader import example_text
-from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.sampling import METHODS, Distribution, Sampling
 
 
 def values_of(study: Any, run: int) -> tuple[Any, ...]:

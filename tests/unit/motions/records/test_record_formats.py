@@ -9,7 +9,7 @@ import pytest
 from support import record_writers as w
 
 from msfp_gen import Motion
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.motions.records import baseline_corrected, bundled, read_peer, read_record, uncorrected, write_csv
 
 LABELS = ("90 Deg", "360 Deg", "Up")

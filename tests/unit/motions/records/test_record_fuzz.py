@@ -22,7 +22,7 @@ from support.damaged_records import (
     WAVES,
 )
 
-from msfp_gen.errors import InputError
+from msfp_gen.common.errors import InputError
 from msfp_gen.motions import records
 from msfp_gen.motions.records import csv_table, text
 from msfp_gen.motions.records.record import Record

@@ -12,7 +12,7 @@ from support import scene_of
 
 from msfp_gen import Auto, Effects, InputError, Motion, RunError, Solver, Stop, load_scene
 from msfp_gen.cli import main
-from msfp_gen.studies.accuracy import output, study, work_precision
+from msfp_gen.studies.accuracy import study, work_precision
 from msfp_gen.studies.accuracy.methods import METHODS, methods_named
 from msfp_gen.studies.accuracy.study import Point, Study, confirming_reruns, is_wrong, run_tolerances, without_stop
 from msfp_gen.studies.accuracy.timed_run import (
@@ -196,7 +196,7 @@ def test_study_measures_and_confirms(small):
 
 @pytest.mark.slow
 def test_output_is_complete(small, tmp_path):
-    paths = output.write(small, tmp_path / "made")
+    paths = study.write(small, tmp_path / "made")
     assert {p.suffix for p in paths} == {".csv", ".json", ".md", ".svg", ".png"}
     data = json.loads((tmp_path / "made" / "work-precision.json").read_text(encoding="utf-8"))
     assert data["confirmed_by"]["method"] == "Radau" and len(data["points"]) == 4
@@ -212,13 +212,13 @@ def test_failures_and_wrong_successes_are_marked():
     runs = [trial(wave=0.2), trial(status="newton"), trial(status=CUT_OFF, reached=0.1, seconds=2.0)]
     points = tuple(study.point_of("a", run, reference) for run in runs)
     made = Study(load_scene("fenz-test1"), "work-precision", points, reference, ())
-    columns = output.figure_table(made)["a"]
+    columns = study.figure_table(made)["a"]
     assert columns["wrong"] == [1, 0, 0] and columns["failed"] == [0, 1, 0] and columns["cut"] == [0, 0, 1]
     assert columns["seconds"][2] == pytest.approx(20.0) and columns["newton"][2] == pytest.approx(50.0)
-    cells = output.tables(made)[0].rows
+    cells = study.tables(made)[0].rows
     assert cells[0][2] == "WRONG SUCCESS" and cells[1][2] == "newton" and cells[2][3] == "(about 20)"
     left_out = Point("c", trial("c", status=REFUSED), None, False)
-    assert "c" not in output.figure_table(replace(made, points=(*points, left_out)))
+    assert "c" not in study.figure_table(replace(made, points=(*points, left_out)))
 
 
 @pytest.mark.parametrize(
@@ -240,7 +240,7 @@ def test_methods_by_name():
 
 
 def test_command_writes_and_prints(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(output, "draw", lambda found, path: None)  # drawn in the test above
+    monkeypatch.setattr(study, "draw", lambda found, path: None)  # drawn in the test above
     words = ["bench", "work-precision", "fenz-test1", "--duration", "0.3", "--methods", "implicit,Radau"]
     assert main([*words, "--tolerances", "1e-2,1e-3", "-o", str(tmp_path / "out"), "--json"]) == 0
     out, err = capsys.readouterr()

@@ -14,11 +14,11 @@ from support.peers import opensees_runs
 
 from msfp_gen import InputError, Motion, RunError, Top, load_scene, presets, simulate
 from msfp_gen.cli import main
-from msfp_gen.studies.accuracy import model_errors, models, opensees, output
+from msfp_gen.studies.accuracy import model_errors, models, series
 from msfp_gen.studies.accuracy.methods import METHODS
 from msfp_gen.studies.accuracy.models import VARIANTS
 from msfp_gen.studies.accuracy.series import Series, run_series
-from msfp_gen.studies.accuracy.study import without_stop
+from msfp_gen.studies.accuracy.study import markdown, without_stop
 from msfp_gen.studies.accuracy.timed_run import OK, ROWS, errors, run_native
 
 NAMED = {variant.name: variant for variant in VARIANTS}
@@ -131,11 +131,11 @@ def test_model_errors_are_measured_against_the_full_model(study):
 def test_steps_are_told_from_tolerances(study):
     settings = {point.series: point.trial.setting for point in study.points}
     assert settings["linearised"] == "0.0015 s" and settings["planar"] == "0.0001"
-    assert "0.0015 s" in output.markdown(study)
+    assert "0.0015 s" in markdown(study)
 
 
 def test_what_does_not_apply_is_left_out_and_said(monkeypatch):
-    monkeypatch.setattr(opensees, "find_spec", lambda name: None)
+    monkeypatch.setattr(series, "find_spec", lambda name: None)
     for name, changes, why in (
         ("massless", {"sliders": "massless"}, "the scene itself has sliders = 'massless'"),
         ("no rims", {"rims": False}, "the scene itself has rims = False"),
@@ -188,7 +188,7 @@ class Ops(ModuleType):
 def fake(monkeypatch):
     def use(last=10**9):
         ops = Ops(last)
-        monkeypatch.setattr(opensees, "find_spec", lambda name: True)
+        monkeypatch.setattr(series, "find_spec", lambda name: True)
         monkeypatch.setitem(sys.modules, "openseespy", ModuleType("openseespy"))
         monkeypatch.setitem(sys.modules, "openseespy.opensees", ops)
         return ops
@@ -198,7 +198,7 @@ def fake(monkeypatch):
 
 def test_opensees_is_given_the_bearing(fake):
     ops, scene = fake(), short(duration=1.0)
-    found = opensees.run_opensees(scene, 50)
+    found = series.run_opensees(scene, 50)
     words = ops.calls["element"]
     assert words[0] == "TripleFrictionPendulum"
     assert words[11:14] == pytest.approx((0.053, 0.435, 0.435))
@@ -211,7 +211,7 @@ def test_opensees_is_given_the_bearing(fake):
 
 def test_opensees_that_fails_is_a_failure(fake):
     fake(last=20)
-    found = opensees.run_opensees(short(duration=1.0), 50)
+    found = series.run_opensees(short(duration=1.0), 50)
     assert found.status == "failed" and found.reached == pytest.approx(0.4) and len(found.force) == 801
 
 
@@ -233,14 +233,14 @@ def test_opensees_that_fails_is_a_failure(fake):
 def test_opensees_is_not_given_what_it_cannot_be(fake, scene, why):
     fake()
     with pytest.raises(InputError, match=why):
-        opensees.run_opensees(scene, 10)
+        series.run_opensees(scene, 10)
 
 
 def test_opensees_agrees_with_the_linearised_bearing():
     if not opensees_runs():
         pytest.skip("OpenSeesPy cannot be imported")
     scene = without_stop(load_scene("fenz-test3"))
-    found = errors(opensees.run_opensees(scene, 1000), run_series(scene, 1000))
+    found = errors(series.run_opensees(scene, 1000), run_series(scene, 1000))
     assert found.force_rms < 0.05
 
 
