@@ -33,8 +33,10 @@ BOUNDS = 'rule = "asce7"\n[[factor]]\nproperty = "friction"\nsurfaces = [1, 4]\n
 
 
 def under(word: str, **effects: Any) -> Scene:
-    """The report's test 2 under a law."""
-    return lawful(scene_of("fenz-test2", effects), word, LAWS[word].get("friction_law"), **VALUES[word])
+    """The report's test 2 under a law, in the plane of its motion."""
+    return lawful(
+        scene_of("fenz-test2", {"dimension": "planar", **effects}), word, LAWS[word].get("friction_law"), **VALUES[word]
+    )
 
 
 @cache
@@ -93,7 +95,7 @@ def test_a_run_that_heats_goes_on_from_its_checkpoint(
 ) -> None:
     """Every exponential state is in the file: the same rows, bit by bit."""
     monkeypatch.setattr(simulation, "STEPS_PER_CALL", 20)
-    scene = replace(under("pvt", dimension="planar", uplift=uplift), output_step=0.05)
+    scene = replace(under("pvt", uplift=uplift), output_step=0.05)
     scene = replace(scene, duration=8.0)
     whole = simulate(scene)
     part = interrupted(scene, tmp_path / "run.ck", 4.0)
@@ -135,7 +137,7 @@ def test_heat_comes_through_the_patch() -> None:
     wide, narrow = (
         simulate(
             lawful(
-                scene_of("fenz-test2"),
+                scene_of("fenz-test2", {"dimension": "planar"}),
                 "pvt",
                 reference_pressure=P_REF,
                 pressure_ratio=1.0,

@@ -58,7 +58,9 @@ def off(found: dict[str, float]) -> dict[str, float]:
     return {name: abs(found[name] / value - 1) for name, value in closed_form().items()}
 
 
-@pytest.mark.parametrize("effects", [{}, {"dimension": "planar"}, {"sliders": "massless"}], ids=str)
+@pytest.mark.parametrize(
+    "effects", [{}, {"dimension": "planar"}, {"dimension": "planar", "sliders": "massless"}], ids=str
+)
 @pytest.mark.parametrize("symbol", TABLE)
 def test_table_4_2(symbol: str, effects: dict[str, str]) -> None:
     value, band = TABLE[symbol]

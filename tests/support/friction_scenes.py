@@ -30,5 +30,5 @@ def lawful(scene: Scene, word: str, text: str | None = None, **values: Any) -> S
 def heated(**effects: Any) -> Result:
     """Quick strokes of small patches under a real load: what heats."""
     motion = Motion.harmonic(0.08, 1.0, cycles=2.0)
-    scene = scene_of("fenz-test2", effects, {"rtol": 1e-5}, motion=motion)
+    scene = scene_of("fenz-test2", {"dimension": "planar", **effects}, {"rtol": 1e-5}, motion=motion)
     return simulate(lawful(scene, "pvt", reference_pressure=P_REF, patch_radius=RADIUS))

@@ -331,7 +331,10 @@ FIRST = ["ridgecrest-ccc", "ridgecrest-clc", "hospital-ccc", "hospital-clc", "fe
 PUBLISHED = [*presets.names("scene"), *presets.names("building"), *sorted((ROOT / "examples").glob("*.toml"))]
 
 
-@pytest.mark.parametrize("name", thinned(PUBLISHED, lambda name: name != "hospital-clc"), ids=str)
+RARE = ["hospital-ccc", "hospital-clc", "double-articulated-push", "quintuple-push"]  # long, or layouts of their own
+
+
+@pytest.mark.parametrize("name", thinned(PUBLISHED, lambda name: name not in RARE), ids=str)
 def test_no_published_design_is_blamed(name: str | Path) -> None:
     """Every preset and example, as it is, is within the limits that are not given; the first have no notes."""
     result = simulate(load_scene(name))

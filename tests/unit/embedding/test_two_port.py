@@ -62,7 +62,7 @@ def test_small_commits_tend_to_one_large_one():
 SMOOTH: list[tuple[dict[str, object], float, float, tuple[float, float, float]]] = [
     ({}, 1e-8, 5e-5, (1e-8, 1e-8, 1e-7)),
     ({"uplift": True}, 1e-8, 5e-5, (5e-7, 5e-7, 2e-5)),
-    ({"friction": "pvt"}, 1e-7, 1e-4, (1e-7, 1e-7, 1e-6)),
+    ({"friction": "pvt", "bouc_wen": "plastic"}, 1e-7, 1e-4, (1e-7, 1e-7, 1e-6)),
     ({"sliders": "massless"}, 1e-7, 1e-4, (1e-7, 1e-7, 1e-5)),
 ]
 HOT = BEARING.replace(reference_pressure=15e6, patch_radius=0.025, velocity_rate=100.0)

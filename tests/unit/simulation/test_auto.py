@@ -245,13 +245,13 @@ def test_sliders_get_their_mass_back_when_the_load_falls() -> None:
 
 
 def test_rims_are_there_when_a_slider_comes_to_them() -> None:
-    scene = replace(load_scene("fenz-test5"), output_step=0.1, duration=60.0, effects=Auto())
+    scene = replace(load_scene("fenz-test5"), output_step=0.1, duration=60.0, effects=Auto(sliders="inertial"))
     full = simulate(replace(scene, effects=FULL))
     blind = with_selection(scene, rims=False)
     result = simulate(blind)
     assert kinds(result) == ["rims"] and result.notes[0].value > 0
     assert apart(result, full) < 5e-3
-    ignored = simulate(replace(scene, effects=Auto(rims=False)))
+    ignored = simulate(replace(scene, effects=Auto(rims=False, sliders="inertial")))
     assert apart(ignored, full) > 0.05 and next(note.kind for note in ignored.notes) == "rims"
     with pytest.raises(RunError, match="beyond the capacity") as error:
         simulate(blind, strict=True)
@@ -265,7 +265,7 @@ def test_a_bearing_that_parts_is_followed_into_flight() -> None:
     weight = 11e3 * 9.80665
     load = Load.from_arrays([0, 1, 1.05, 1.15, 1.2, 4], np.outer([0, 0, 1, 1, 0, 0], [0.0, 0.0, 1.5 * weight]))
     top = Top.mass(11e3, 4e3, 0.3, rotational_stiffness=1e7, rotational_damping=1e4)
-    scene = Scene(presets.bearing("double-fp"), STILL, top, load=load, output_step=0.005, duration=1.5, effects=Auto())
+    scene = Scene(presets.bearing("fenz-tfp"), STILL, top, load=load, output_step=0.005, duration=1.5, effects=Auto())
     assert chosen(scene, "uplift")[0] is True
     known = simulate(scene)
     result = simulate(with_selection(scene, uplift=False, sliders="massless"))
@@ -381,7 +381,8 @@ def test_positions_and_friction_are_carried_over_exactly() -> None:
 
 def test_energies_go_on_over_a_change_of_models() -> None:
     """No term jumps where another model takes over, and all of them end where those of the full model do."""
-    scene = replace(load_scene("fenz-test5"), output_step=0.02, duration=60.0, effects=Auto(bouc_wen="report"))
+    chosen = Auto(bouc_wen="report", sliders="inertial")
+    scene = replace(load_scene("fenz-test5"), output_step=0.02, duration=60.0, effects=chosen)
     result, full = simulate(with_selection(scene, rims=False)), simulate(replace(scene, effects=FULL))
     (time,) = [note.time for note in result.notes if note.action]
     energy, rows = result.history.energy, result.history.time
@@ -462,10 +463,10 @@ def test_energies_are_continuous_over_a_change_of_models() -> None:
     load = Load.from_arrays([0, 1, 3, 40], np.outer([0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 111.95e3]))
     motion, top = Motion.harmonic(0.05, 1.0, cycles=4), Top.rig(112e3, 1e8, damping=5.0, rotational_stiffness=1e6)
     falling = Scene(presets.bearing("fenz-tfp"), motion, top, load=load, effects=Auto(uplift=False))
-    leaving = replace(load_scene("fenz-test5"), duration=60.0, effects=Auto())
+    leaving = replace(load_scene("fenz-test5"), duration=60.0, effects=Auto(sliders="inertial"))
     for scene, fewer, model in [
         (falling, {"sliders": "massless"}, Effects(dimension="planar")),
-        (replace(kumar(), duration=2.0, output_step=None), {}, Effects(friction="pvt")),
+        (replace(kumar(), duration=2.0, output_step=None), {}, Effects(friction="pvt", dimension="planar")),
         (leaving, {"rims": False}, FULL),
     ]:
         result = simulate(with_selection(scene, **fewer) if fewer else scene)

@@ -41,7 +41,7 @@ SCENES = {
     "own steps": ("fenz-test2", {}, {}, {}),
     "even rows": ("fenz-test2", {}, {}, {"output_step": 0.01}),
     "the report's method": ("fenz-test2", {}, {"method": "dopri5", "rtol": 1e-3}, {"duration": 0.3}),
-    "massless": ("fenz-test5", {"sliders": "massless"}, {}, {"duration": 100.0}),
+    "massless": ("fenz-test5", {"dimension": "planar", "sliders": "massless"}, {}, {"duration": 100.0}),
     "planar, rims met": ("fenz-test5", {"dimension": "planar"}, {}, {"duration": 100.0}),
     "a record, step by step": ("ridgecrest-clc", {}, {}, {"duration": 15.0, "output_step": 0.02}),
     "seats, where bodies may part": ("fenz-test2", {"uplift": True, "dimension": "planar"}, {}, {"duration": 20.0}),

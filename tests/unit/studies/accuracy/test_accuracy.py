@@ -164,7 +164,7 @@ def test_every_library_method_gives_the_same_motion(name):
 
 
 def test_a_method_that_cannot_run_a_scene_is_left_out():
-    scene = scene_of("fenz-test1", {"sliders": "massless"}, duration=0.2)
+    scene = scene_of("fenz-test1", {"dimension": "planar", "sliders": "massless"}, duration=0.2)
     for name in ("dopri5", "Radau"):
         trials, notes = run_tolerances(METHODS[name], scene, [1e-2], 5.0, lambda line: None)
         assert not trials and "massless" in notes[0]
