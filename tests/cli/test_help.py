@@ -117,7 +117,7 @@ def test_spectra_scales_and_reports_say_how_far_they_are():
     assert told == [(1, 2), (2, 2)]
     target = ScaleTo.parse("sds=1 g, sd1=0.6 g, between=1:2")
     told.clear()
-    target.factor(baseline_corrected(record, duration=20.0), lambda *at: told.append(at))
+    target.factor(baseline_corrected(record, duration=4.0), lambda *at: told.append(at))
     assert told == [(k, 100) for k in range(1, 101)]
     told.clear()
     report_html(loops(), 2, lambda *at: told.append(at))

@@ -101,7 +101,7 @@ def hemisphere() -> Bearing:
 # ---- radii -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("radius", [0.05, 0.5, 5.0])
+@pytest.mark.parametrize("radius", [0.05, 0.5, pytest.param(5.0, marks=pytest.mark.slow)])
 def test_radii_of_real_bearings_follow_the_reference(radius: float) -> None:
     bearing = a_stack(
         TFP,

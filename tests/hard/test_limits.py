@@ -127,7 +127,7 @@ def test_run_from_a_state_without_an_acceleration_is_named(moment: float, method
 # ---- load ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("load", thinned([1.0, 1e3, 1e5, 1e7], lambda load: load in (1.0, 1e7)))
+@pytest.mark.parametrize("load", thinned([1.0, 1e3, 1e5, 1e7], lambda load: load == 1e7))
 def test_any_load_follows_the_reference(load: float) -> None:
     """From less than the weight of its own plates (20 N) to 1000 t. Light ones ring at some hertz: push slowly."""
     speed = 5e-3 if load > 100 else 5e-4
@@ -185,7 +185,7 @@ def test_a_load_that_passes_through_zero_is_named_at_the_moment_it_does() -> Non
 # ---- mass ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mass", thinned([1e-6, 1e-3, 1.0, 10.0], lambda mass: mass in (1e-6, 10.0)))
+@pytest.mark.parametrize("mass", thinned([1e-6, 1e-3, 1.0, 10.0], lambda mass: mass == 1e-6))
 def test_any_slider_mass_follows_the_reference(mass: float) -> None:
     """Stuck modes from 300 Hz to a megahertz; the work does not grow with them."""
     run = pushed(a_stack(TFP, RADII, body={"mass": mass}, **USUAL), PATH, speed=5e-3, rtol=1e-4)

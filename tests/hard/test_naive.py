@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import naive
 import pytest
-from support import ROOT
+from support import ROOT, thinned
 
 
 def words(text: str) -> str:
@@ -15,7 +15,9 @@ def words(text: str) -> str:
     return re.sub(r"[-+\d.e$\\ |]+", " ", text.replace("lvert", "").replace("rvert", ""))
 
 
-@pytest.mark.parametrize("case", naive.CASES, ids=lambda case: case.__name__)
+@pytest.mark.parametrize(
+    "case", thinned(naive.CASES, lambda case: case is not naive.unrolled_expressions), ids=lambda case: case.__name__
+)
 def test_naive_code_still_fails_as_the_page_says(case: Callable[[], str]) -> None:
     assert words(case()).strip() in words((ROOT / "docs" / "stability.md").read_text(encoding="utf-8"))
 

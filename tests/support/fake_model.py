@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -88,6 +89,13 @@ def prebuilt(factory: pytest.TempPathFactory) -> Path:
     root = factory.mktemp("prebuilt")
     assert run_child(write_house(root / "house"), root / "models").communicate()[0].split()[:2] == ["False", "42.0"]
     return root / "models"
+
+
+def keep_wrapper(prebuilt: Path, models: Path) -> None:
+    """Copy the object of the wrapper from one cache into another."""
+    models.mkdir(exist_ok=True)
+    for path in prebuilt.glob("wrapper-*.o"):
+        shutil.copy2(path, models)
 
 
 if __name__ == "__main__":

@@ -38,6 +38,7 @@ from msfp_gen.simulation.segment import start_run
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import ModelSpec
 
+PLANAR = Effects(dimension="planar")  # of the library: half of the compiling of a spatial one
 STRICT = "-std=c99 -O1 -Wall -Wextra -Werror -pedantic"
 C = ROOT / "tests" / "support" / "c"
 
@@ -51,7 +52,7 @@ def needs(*tools: str) -> pytest.MarkDecorator:
 def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two layouts in one library; the folder is moved after the export."""
     written, moved = tmp_path_factory.mktemp("written") / "msfp", tmp_path_factory.mktemp("moved") / "msfp"
-    assert cli.main(["export", "5", "2", "2", "3", "1", "1", "--prefix", str(written)]) == 0
+    assert cli.main(["export", "5", "2", "2", "3", "1", "1", "--dimension", "planar", "--prefix", str(written)]) == 0
     shutil.move(written, moved)
     return moved
 
@@ -85,14 +86,14 @@ def values_header(prefix: Path, folder: Path) -> None:
 
 def example_scene() -> Scene:
     """The triple pendulum of the example as a scene."""
-    found = values.example(ModelSpec(Layout.tfp(), Effects()))
+    found = values.example(ModelSpec(Layout.tfp(), PLANAR))
     names = ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
     top = dict(zip(contract.names(contract.TOP), found.top, strict=True))
     return Scene(
         bearing=example_bearing(),
         motion=Motion.ramp(values.ACCELERATION, values.DURATION),
         top=Top.rig(axial_load=values.LOAD, **{name: top[name] for name in names}),
-        effects=Effects(),
+        effects=PLANAR,
         solver=Solver(rtol=1e-4),
         output_step=values.OUTPUT_STEP,
     )
@@ -162,7 +163,7 @@ def test_rows_are_those_of_python_bit_by_bit(prefix: Path, tmp_path: Path) -> No
     """
     program = compiled(prefix, REPLAY, tmp_path, "-DMODEL=msfp_5_2_2")
     for output_step in (None, 0.05):
-        scene = replace(load_scene("fenz-test2"), output_step=output_step)
+        scene = replace(load_scene("fenz-test2"), effects=PLANAR, output_step=output_step)
         python = python_run(scene)
         for arguments in (["rows"], ["rows", "early"]):
             *lines, steps, status = run([str(program), *arguments], tmp_path, inputs(scene)).splitlines()

@@ -179,7 +179,7 @@ def without_names(source: str, layout: tuple[int, int, int]) -> str:
     return source.replace("{}_{}_{}".format(*layout), "N_M_P")
 
 
-@pytest.mark.parametrize("larger", [(7, 3, 3), (11, 5, 5)], ids=str)
+@pytest.mark.parametrize("larger", thinned([((7, 3, 3),), ((11, 5, 5),)], lambda larger: larger == (7, 3, 3)), ids=str)
 def test_kernels_do_not_grow_with_the_stack(larger: tuple[int, int, int]) -> None:
     small = without_names(text("msfp_kernels.h"), (5, 2, 2))
     assert without_names(text("msfp_kernels.h", larger), larger) == small

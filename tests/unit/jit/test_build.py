@@ -42,6 +42,12 @@ def models(prebuilt: Path, tmp_path: Path) -> Path:
     return tmp_path / "models"
 
 
+@pytest.fixture
+def wrapper(prebuilt: Path, tmp_path: Path) -> None:
+    """An empty cache but for the object of the wrapper, whose Cython takes most of the build of a fake model."""
+    fake_model.keep_wrapper(prebuilt, tmp_path / "models")
+
+
 def break_generator(monkeypatch: pytest.MonkeyPatch, **texts: str) -> None:
     def generate(spec: ModelSpec) -> object:
         generated = fake_model.generate(spec)
@@ -157,7 +163,7 @@ def test_models_of_processors_differ_in_the_key_and_not_in_the_identity(monkeypa
     assert cache.Entry.of(SPEC, portable=True) == entries[0]
 
 
-def test_flags_of_the_processor_reach_the_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_flags_of_the_processor_reach_the_compiler(wrapper: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cache, "processor_flags", lambda _: ("-DMSFP_X86_64_LEVEL=2",))
     info = build.prepare(SPEC)
     assert "-DMSFP_X86_64_LEVEL=2" in (info.folder / "build.log").read_text()
@@ -212,7 +218,7 @@ def test_refused_sources_name_file_line_and_log(
     assert not list((tmp_path / "models").glob("*/manifest.json")), "a failed build is not an entry"
 
 
-def test_a_symbol_that_nobody_defines(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_symbol_that_nobody_defines(wrapper: None, monkeypatch: pytest.MonkeyPatch) -> None:
     break_generator(monkeypatch, kernel="typedef int msfp_none;\n")
     info = build.prepare(SPEC)
     with pytest.raises(CompileError, match=r"does not load: .*msfp_twice.*build\.log"):
@@ -270,6 +276,7 @@ def test_damaged_entry_is_not_believed(damage: str, models: Path) -> None:
         assert entry.find() is None
 
 
+@pytest.mark.slow
 def test_two_processes_build_once(house: Path, tmp_path: Path) -> None:
     children = [run_child(house, tmp_path / "models") for _ in range(2)]
     answers = sorted(child.communicate()[0].split()[:2] for child in children)

@@ -115,7 +115,8 @@ def test_a_damaged_entry_is_replaced_by_a_sound_one(entry: cache.Entry) -> None:
     assert_works()
 
 
-def test_altered_sources_are_not_handed_out(tmp_path: Path) -> None:
+def test_altered_sources_are_not_handed_out(prebuilt: Path, tmp_path: Path) -> None:
+    fake_model.keep_wrapper(prebuilt, tmp_path / "models")
     (build.prepare(SPEC, portable=True).folder / "unit.c").write_text("int evil;\n")
     with pytest.warns(RuntimeWarning, match="damaged"):
         build.generate_to(SPEC, tmp_path / "out")
@@ -201,6 +202,7 @@ def test_four_builders_build_once(house: Path, tmp_path: Path) -> None:
     assert sorted(path.name for path in (tmp_path / "models").glob("msfp_*")) == [folder, f"{folder}.lock"]
 
 
+@pytest.mark.slow
 def test_a_builder_that_came_second_leaves_no_folder(house: Path, tmp_path: Path) -> None:
     """It waits for the lock while the first one builds, and finds the model when it has the lock."""
     models = tmp_path / "models"

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import ROOT, preset_run, scene_of
+from support import ROOT, preset_run, scene_of, thinned
 from support.resuming import assert_same, interrupted, stopping_at
 
 from msfp_gen import Auto, InputError, Load, Motion, RunError, Scene, Top, load_scene, presets, simulate
@@ -78,7 +78,7 @@ def assert_same_file(whole: Result, path: Path, other: Path) -> Result:
     return found
 
 
-@pytest.mark.parametrize("case", SCENES)
+@pytest.mark.parametrize("case", thinned(SCENES, lambda case: case in ("even rows", "a planar model aslant")))
 def test_the_file_is_that_of_an_unstreamed_run(case: str, tmp_path: Path) -> None:
     scene = SCENES[case]
     whole, part = simulate(scene), simulate(scene, stream=tmp_path / "run.nc")
@@ -184,7 +184,10 @@ def test_a_run_without_a_row_writes_no_file(tmp_path: Path) -> None:
         pytest.param(leaving(), id="two models"),
     ],
 )
-def test_a_checkpoint_and_its_rows_continue_to_the_same_file(scene: Scene, tmp_path: Path) -> None:
+def test_a_checkpoint_and_its_rows_continue_to_the_same_file(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(simulation, "STEPS_PER_CALL", 100)
     path, file = tmp_path / "run.ck", tmp_path / "run.nc"
     end = scene.end
     for when in (0.3 * end, 0.6 * end, 0.9 * end):
@@ -291,7 +294,7 @@ from msfp_gen.simulation.streamed_rows import write_blocks
 path = Path(sys.argv[1])
 result = Result.from_netcdf(path)
 count, size = len(result.history.time), path.stat().st_size
-for limit in [1, *range(1000, size, size // 5)]:
+for limit in (1, 1000, size // 2):
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
     rows = blocks(count, lambda start, end: taken(result.history, slice(start, end)))
     try:
@@ -308,7 +311,7 @@ def test_a_disk_that_fills_while_the_result_is_written(tmp_path: Path) -> None:
     path = preset_run("fenz-test2").to_netcdf(tmp_path / "run.nc")
     done = subprocess.run([sys.executable, "-c", FULL, str(path)], cwd=ROOT, text=True, capture_output=True)
     lines = done.stdout.splitlines()
-    assert done.returncode == 0 and len(lines) >= 5, done.stderr
+    assert done.returncode == 0 and len(lines) == 3, done.stderr
     assert all("File too large" in line and str(tmp_path / "full.nc") in line for line in lines)
     assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]
 

@@ -106,6 +106,7 @@ def test_the_chain_leaves_out_what_does_not_pay():
     assert best_chain({"exact": 1.0, "backbone": 0.05}, costs | {"backbone": 0.5}).models == ("exact",)
 
 
+@pytest.mark.slow
 def test_the_variance_is_that_of_repetitions():
     """Brute force: the stated variance of an estimate of three levels against that of two hundred repetitions."""
     values, variances = [], []
@@ -132,7 +133,7 @@ CASES = {
 RARE = float(np.exp(norm.isf(1e-3) * np.sqrt(truth())))  # what one draw in a thousand reaches
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", ["mean", pytest.param("probability", marks=pytest.mark.slow)])
 def test_intervals_hold_the_truth(case):
     """Of a hundred intervals of 95 % at least 88 hold it (a chance of 0.4 % for fewer); few exact runs suffice."""
     statistic, threshold, target, value = CASES[case]

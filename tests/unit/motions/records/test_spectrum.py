@@ -65,7 +65,7 @@ def test_a_step_overshoots_as_the_closed_form_says():
 
 @pytest.mark.parametrize(
     ("period", "component"),
-    thinned(product([0.05, 0.7, 8.0], [0, 1]), lambda *case: case in ((0.05, 0), (0.7, 1), (8.0, 0))),
+    thinned(product([0.05, 0.7, 8.0], [0, 1]), lambda *case: case in ((0.7, 1), (8.0, 0))),
 )
 def test_a_real_record_against_an_independent_integration(period, component):
     motion = quake()

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import scene_of
+from support import scene_of, thinned
 
 from msfp_gen import Auto, Effects, InputError, Motion, RunError, Solver, Stop, load_scene
 from msfp_gen.cli import main
@@ -154,7 +154,7 @@ def test_what_would_end_soon_is_taken_to_its_end():
     assert not confirming_reruns(scene, [replace(stopped, reached=1e-4)], 1.0, lambda line: None)
 
 
-@pytest.mark.parametrize("name", ["Radau", "BDF", "LSODA", "DOP853"])
+@pytest.mark.parametrize("name", thinned(["Radau", "BDF", "LSODA", "DOP853"], lambda name: name == "Radau"))
 def test_every_library_method_gives_the_same_motion(name):
     scene = short("fenz-monotonic", 0.06, stop=None)
     tight = METHODS["implicit"].attempt(scene, 1e-9, 20.0)
