@@ -14,11 +14,11 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from support import hearing
+from support import hearing, scene_of
 from support.study_tables import cheap_study, rows_of
 
 from msfp_gen.cli import main
-from msfp_gen.scene.file.loader import dumps
+from msfp_gen.scene.file.loader import dumps, scene_text
 from msfp_gen.studies import load_study
 
 
@@ -26,6 +26,12 @@ def written(folder: Path, **changes: Any) -> Path:
     path = folder / "study.toml"
     path.write_text(dumps(cheap_study(**changes)), encoding="utf-8")
     return path
+
+
+def planar(folder: Path) -> str:
+    """The scene of the cheap study in its plane, whose massless model other tests build, as a file beside the study."""
+    (folder / "scene.toml").write_text(scene_text(scene_of("fenz-test1", {"dimension": "planar"})), encoding="utf-8")
+    return "scene.toml"
 
 
 def started(*arguments: str | Path) -> subprocess.Popen[str]:
@@ -57,7 +63,10 @@ def test_a_study_runs_continues_and_says_how_far_it_is(tmp_path: Any, capsys: py
 
 
 def test_an_estimate_is_ten_lines(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    path, out = written(tmp_path, accuracy={"models": ["massless"], "pilot": 16}), tmp_path / "out"
+    path, out = (
+        written(tmp_path, scene=planar(tmp_path), accuracy={"models": ["massless"], "pilot": 16}),
+        tmp_path / "out",
+    )
     arguments = ["study", str(path), "-o", str(out), "--threads", "--workers", "1", "--target", "20%"]
     assert main([*arguments, "--estimate", "peak_force"]) == 0
     shown = capsys.readouterr().out.splitlines()
@@ -120,7 +129,9 @@ def test_killed_studies_continue_to_the_same_table(tmp_path: Any) -> None:
 
 
 def test_killed_estimates_continue_with_the_same_draws(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    path = written(tmp_path, accuracy={"models": ["massless"], "pilot": 16, "target": "5 %"}, chunk=2)
+    path = written(
+        tmp_path, scene=planar(tmp_path), accuracy={"models": ["massless"], "pilot": 16, "target": "5 %"}, chunk=2
+    )
     out, whole = tmp_path / "out", tmp_path / "whole"
     process = started(path, "-o", out, "--estimate", "peak_force", "--workers", "2")
     await_parts(out, 2)

@@ -71,6 +71,7 @@ def test_variance_by_hand():
     assert inertia_study.variance(1.1 * d, d) == pytest.approx(0.1)
 
 
+@pytest.mark.slow
 def test_study_reports_the_run_that_failed(tmp_path):
     """A bearing that weighs more than its load, on rims made for 112 kN, ends early: said in every place."""
     points = inertia_study.study(LIGHTEST)

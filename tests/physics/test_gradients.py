@@ -148,7 +148,8 @@ def test_differences_with_the_same_steps_through_frictional_heating(method: str)
 
 def test_extremes_of_a_friction_law_that_heats_are_those_of_the_steps() -> None:
     """With a row at every step their derivatives are those of the rows."""
-    scene = replace(heated(patch_radius=0.15), output_step=None)
+    scene = heated(patch_radius=0.15)
+    scene = replace(scene, output_step=None, effects=replace(scene.effects, dimension="planar"))
     result = simulate(scene, gradients=["bearing.surfaces[0].conductivity"], gradient_errors=False)
     mu, temperature = result.history.friction_coefficient, result.history.temperature
     assert mu is not None and temperature is not None and temperature.max() > 40.0

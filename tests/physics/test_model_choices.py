@@ -69,7 +69,7 @@ def test_centre_of_mass_of_the_base_never_enters():
 
 def test_massless_sliders_keep_their_weight():
     bearing, zero = presets.bearing("fenz-tfp"), np.zeros((4, 3))
-    model = build_model(bearing.layout, Effects(sliders="massless"))
+    model = build_model(bearing.layout, Effects(dimension="planar", sliders="massless"))
     found = model.evaluate(bearing, zero, zero, zero[:, :2], top_force=LOAD).normal_force - 112e3
     weights = 9.8 * np.array([body.mass for body in bearing.bodies])
     assert found == pytest.approx(np.cumsum(weights[::-1])[::-1], abs=1e-6)

@@ -161,6 +161,7 @@ def test_the_scene_of_a_file_runs_again(tmp_path: Path):
     assert np.array_equal(simulate(read.scene).wrench, pushed().wrench)
 
 
+@pytest.mark.slow  # a layout of its own with plates that turn
 def test_bearings_of_other_layouts_have_no_values_where_they_have_no_surface():
     from msfp_gen import presets
 

@@ -85,7 +85,7 @@ def test_start_and_slope_at_rest() -> None:
 def test_what_is_no_ordinary_differential_equation_is_refused() -> None:
     bearing = presets.bearing("fenz-tfp")
     with pytest.raises(InputError, match="massless"):
-        model_of(TFP, sliders="massless").as_ode(bearing, wave(), RIG)
+        model_of(TFP, dimension="planar", sliders="massless").as_ode(bearing, wave(), RIG)
     with pytest.raises(InputError, match="E1-E3 plane"):
         model_of(TFP, dimension="planar").as_ode(bearing, wave().rotated(np.pi / 2), RIG)
 

@@ -108,7 +108,7 @@ def test_order_of_dense_output(method, order):
 CASES = {
     "spatial, rims": ("fenz-monotonic", {}),
     "planar": ("fenz-test2", {"dimension": "planar"}),
-    "massless": ("fenz-test2", {"sliders": "massless"}),
+    "massless": ("fenz-test2", {"dimension": "planar", "sliders": "massless"}),
     "orbit": ("becker-circle-50", {}),
 }
 

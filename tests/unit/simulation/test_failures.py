@@ -174,10 +174,12 @@ def test_a_displaced_start_without_inertia_names_a_remedy_that_works(tilt: float
 def test_massless_evaluation_gives_rates_and_names_uplift() -> None:
     """A massless stack has no acceleration; its contact is defined all the same, and it cannot pull either."""
     bearing, shape = presets.bearing("fenz-tfp"), (4, 3)
-    state = (np.full(shape, [0.01, 0.02, 0.0]), np.full(shape, [0.1, 0.2, 0.0]), np.full((4, 2), 0.3))
-    massless = build_model(bearing.layout, Effects(sliders="massless"))
+    state = (np.full(shape, [0.0, 0.02, 0.0]), np.full(shape, [0.0, 0.2, 0.0]), np.full((4, 2), [0.3, 0.0]))
+    massless = build_model(bearing.layout, Effects(dimension="planar", sliders="massless"))
     found = massless.evaluate(bearing, *state, top_force=(0.0, 0.0, -112e3))
-    heavy = build_model(bearing.layout, Effects()).evaluate(bearing, *state, top_force=(0.0, 0.0, -112e3))
+    heavy = build_model(bearing.layout, Effects(dimension="planar")).evaluate(
+        bearing, *state, top_force=(0.0, 0.0, -112e3)
+    )
     assert found.acceleration is None
     assert np.abs(found.friction_rate - heavy.friction_rate).max() < 1e-2 * np.abs(heavy.friction_rate).max()
     with pytest.raises(RunError, match="would have to pull"):

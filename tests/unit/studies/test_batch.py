@@ -101,7 +101,7 @@ def flying() -> Scene:
     """A bearing that a jerk unloads for a fifth of a second, begun with a model that keeps all surfaces closed."""
     load = Load.from_arrays([0, 1, 1.05, 1.15, 1.2, 4], np.outer([0, 0, 1, 1, 0, 0], [0.0, 0.0, 1.6e5]))
     top = Top.mass(11e3, 4e3, 0.3, rotational_stiffness=1e7, rotational_damping=1e4)
-    scene = Scene(presets.bearing("double-fp"), STILL, top, load=load, output_step=0.005, duration=1.5, effects=Auto())
+    scene = Scene(presets.bearing("fenz-tfp"), STILL, top, load=load, output_step=0.005, duration=1.5, effects=Auto())
     scene.__dict__["effect_selection"] = EffectSelection(replace(scene.modelled, uplift=False, sliders="massless"))
     return scene
 
