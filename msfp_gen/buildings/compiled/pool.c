@@ -30,7 +30,7 @@ static int first_of(const msfp_building *b, int thread)
 }
 
 /* The bearings of a thread, then those of the others that are left. */
-static void work(msfp_building *b, int thread)
+static void take_work(msfp_building *b, int thread)
 {
     pool *p = &b->pool;
     for (int k = 0; k < p->count; ++k) {
@@ -68,7 +68,7 @@ static void *serve(void *given)
     long seen = 0;
     free(given);
     while ((seen = next_generation(p, seen)) != ENDED) {
-        work(at.b, at.thread);
+        take_work(at.b, at.thread);
         if (ADD(p->pending, -1) == 0 && LOAD(p->waiting)) {
             pthread_mutex_lock(&p->lock);
             pthread_cond_signal(&p->done);
@@ -141,7 +141,7 @@ void for_each_bearing(msfp_building *b, task *what)
         STORE(p->pending, p->count - 1);
         begin_generation(p, p->generation + 1);
     }
-    work(b, 0);
+    take_work(b, 0);
     for (int i = 0; i < LOOKS && LOAD(p->pending); ++i)
         relax();
     if (LOAD(p->pending)) {

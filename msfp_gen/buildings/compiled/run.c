@@ -65,7 +65,7 @@ static void end_run(msfp_building *b, int status, int bearing)
 }
 
 /* The accelerations of the ground jump at the present time. */
-static void restart(msfp_building *b)
+static void restart_building(msfp_building *b)
 {
     ground_at(b, b->t);
     ends_now(b);
@@ -92,7 +92,7 @@ static void begin(msfp_building *b)
     if (b->jump < s->jump_count && s->jumps[b->jump] <= msfp_smallest_step(0.0))
         ++b->jump;
     if (!b->status)
-        restart(b);
+        restart_building(b);
     for (int i = 0; i < s->bearings && !b->status; ++i)
         b->status = read_row(b, i);
     if (!b->status) {
@@ -221,7 +221,7 @@ static void accept(msfp_building *b, double h, double t, double error)
     }
     if (!b->status && b->jump < s->jump_count && t >= s->jumps[b->jump] - msfp_smallest_step(t)) {
         ++b->jump;
-        restart(b);
+        restart_building(b);
         b->h = fmin(b->h, 1e-3);
     }
 }
@@ -236,7 +236,7 @@ static void shorten(msfp_building *b, double h, double factor, int status, int b
 }
 
 /* The first bearing, from 1, of which a monitor stops the step; 0: none. */
-static int tripped(msfp_building *b)
+static int tripped_bearing(msfp_building *b)
 {
     int first = 0;
     for (int i = b->scene.bearings - 1; i >= 0; --i)
@@ -265,7 +265,7 @@ static void one_step(msfp_building *b)
             break;
         h = msfp_step_to_event(h, share);
     }
-    if ((b->bearing = tripped(b))) {
+    if ((b->bearing = tripped_bearing(b))) {
         b->status = MSFP_E_MONITOR;
         return;
     }

@@ -214,7 +214,7 @@ static int differentiate(msfp_building *b, double beta)
     return factor_tangent(b);
 }
 
-static void move(msfp_building *b, double factor)
+static void move_ports(msfp_building *b, double factor)
 {
     for (int i = 0; i < b->scene.attachments; ++i)
         b->x[i] -= factor * b->change[i];
@@ -228,21 +228,21 @@ static double iterate(msfp_building *b, double beta, double size, int fresh)
     ++b->counts[MSFP_BUILDING_ITERATIONS];
     memcpy(b->change, b->residual, (size_t)b->scene.attachments * sizeof *b->change);
     solve_tangent(b, b->change);
-    move(b, factor);
+    move_ports(b, factor);
     double next = evaluate(b, beta);
     for (int i = 0; fresh && !(next <= size) && i < HALVINGS; ++i) {
         factor *= 0.5;
-        move(b, -factor);
+        move_ports(b, -factor);
         next = evaluate(b, beta);
     }
     if (!fresh && !(next < size)) { /* old derivatives gave no descent: take the step back */
-        move(b, -1.0);
+        move_ports(b, -1.0);
         next = evaluate(b, beta);
     }
     return next;
 }
 
-static int newton(msfp_building *b, double beta)
+static int solve_stage(msfp_building *b, double beta)
 {
     const double goal = tolerance * b->scene.rtol;
     double size = evaluate(b, beta);
@@ -408,7 +408,7 @@ static int all_stages(msfp_building *b, double h)
         b->solving = i;
         ground_at(b, b->t + b->method.shares[i] * h);
         begin_stage(b, i, h);
-        status = newton(b, beta);
+        status = solve_stage(b, beta);
         if (!status)
             end_stage(b, i, beta);
     }

@@ -65,7 +65,7 @@ static fmu_status set_booleans(fmu *f, const reference *references, size_t count
 }
 
 /* Of a type of which this unit has no variables. */
-static fmu_status none(const fmu *f, size_t count, const char *type)
+static fmu_status no_variables(const fmu *f, size_t count, const char *type)
 {
     return count ? fmu_fail(f, FMU_ERROR, "there are no variables of type %s", type) : FMU_OK;
 }

@@ -52,9 +52,9 @@ FUNCTION(SetBoolean, ANY, (fmi2Component instance, const reference vr[], size_t 
 
 #define NO_VARIABLES(Type)                                                                                             \
     FUNCTION(Get##Type, ANY, (fmi2Component instance, const reference vr[], size_t nvr, fmi2##Type values[]),          \
-             none(f, nvr, #Type))                                                                                      \
+             no_variables(f, nvr, #Type))                                                                              \
     FUNCTION(Set##Type, ANY, (fmi2Component instance, const reference vr[], size_t nvr, const fmi2##Type values[]),    \
-             none(f, nvr, #Type))
+             no_variables(f, nvr, #Type))
 NO_VARIABLES(Integer)
 NO_VARIABLES(String)
 

@@ -60,7 +60,7 @@ VARIABLES(Float64, COUNTED(count == nvr, fmu_get(f, vr, nvr, 0, values)),
 VARIABLES(Boolean, COUNTED(count == nvr, get_booleans(f, vr, nvr, values)),
           COUNTED(count == nvr, set_booleans(f, vr, nvr, values)))
 
-#define NO_VARIABLES(Type) VARIABLES(Type, none(f, nvr, #Type), none(f, nvr, #Type))
+#define NO_VARIABLES(Type) VARIABLES(Type, no_variables(f, nvr, #Type), no_variables(f, nvr, #Type))
 NO_VARIABLES(Float32)
 NO_VARIABLES(Int8)
 NO_VARIABLES(UInt8)
@@ -73,11 +73,11 @@ NO_VARIABLES(UInt64)
 NO_VARIABLES(String)
 FUNCTION(GetBinary, ANY,
          (fmi3Instance instance, const reference vr[], size_t nvr, size_t sizes[], fmi3Binary values[], size_t count),
-         none(f, nvr, "Binary"))
+         no_variables(f, nvr, "Binary"))
 FUNCTION(SetBinary, ANY,
          (fmi3Instance instance, const reference vr[], size_t nvr, const size_t sizes[], const fmi3Binary values[],
           size_t count),
-         none(f, nvr, "Binary"))
+         no_variables(f, nvr, "Binary"))
 
 /* Every output, and every derivative, may depend on all inputs and states. */
 REFUSED(GetNumberOfVariableDependencies, (fmi3Instance instance, reference vr, size_t *count),
@@ -110,7 +110,7 @@ REFUSED(ActivateModelPartition, (fmi3Instance instance, reference clock, fmi3Flo
         "this unit is not for Scheduled Execution")
 
 #define NO_CLOCK(name, ...) FUNCTION(name, ANY, (fmi3Instance instance, const reference vr[], size_t nvr, __VA_ARGS__), \
-                                     none(f, nvr, "Clock"))
+                                     no_variables(f, nvr, "Clock"))
 NO_CLOCK(GetClock, fmi3Clock values[])
 NO_CLOCK(SetClock, const fmi3Clock values[])
 NO_CLOCK(GetShiftDecimal, fmi3Float64 shifts[])

@@ -14,12 +14,12 @@ typedef struct {
     double values[FMU_VALUES];
 } head;
 
-static uint64_t checksum(const head *h)
+static uint64_t sum_of(const head *h)
 {
     return msfp_hash(MSFP_HASH_START, (const char *)h + offsetof(head, phase), h->size - offsetof(head, phase));
 }
 
-static void *memory(const fmu *f, size_t size)
+static void *allocated(const fmu *f, size_t size)
 {
     void *bytes = malloc(size);
     if (!bytes)
@@ -33,7 +33,7 @@ fmu_status fmu_state_get(fmu *f, void **state)
     if (!state)
         return fmu_fail(f, FMU_ERROR, "state: give the address of one");
     free(*state);
-    head *h = *state = memory(f, size);
+    head *h = *state = allocated(f, size);
     if (!h)
         return FMU_ERROR;
     memset(h, 0, sizeof *h);
@@ -49,7 +49,7 @@ fmu_status fmu_state_get(fmu *f, void **state)
         memcpy((char *)(h + 1), f->before, f->size);
         FMU_MODEL()->port_snapshot_write(f->port, (char *)(h + 1) + f->size);
     }
-    h->sum = checksum(h);
+    h->sum = sum_of(h);
     return FMU_OK;
 }
 
@@ -82,11 +82,11 @@ fmu_status fmu_state_to_bytes(const fmu *f, const void *state, void *bytes, size
 fmu_status fmu_state_from_bytes(const fmu *f, const void *bytes, size_t size, void **state)
 {
     if (state && bytes && size >= sizeof(head)) {
-        head *h = memory(f, size); /* the bytes of the importer may lie at any address */
+        head *h = allocated(f, size); /* the bytes of the importer may lie at any address */
         if (!h)
             return FMU_ERROR;
         memcpy(h, bytes, size);
-        if (strncmp(h->token, FMU_TOKEN, sizeof h->token) == 0 && h->size == size && checksum(h) == h->sum) {
+        if (strncmp(h->token, FMU_TOKEN, sizeof h->token) == 0 && h->size == size && sum_of(h) == h->sum) {
             free(*state);
             *state = h;
             return FMU_OK;
