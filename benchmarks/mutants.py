@@ -55,9 +55,9 @@ CHOSEN: dict[str, tuple[str, ...]] = {
     "generator/latex.py": ("tests/unit/generator",),
     "generator/interface.py": ("tests/unit/generator", "tests/unit/embedding/test_library.py"),
     "generator/laws.py": (
-        EQUATIONS,
         "tests/physics/test_friction_laws.py",
         "tests/physics/test_hysteresis.py",
+        EQUATIONS,
     ),
     "msfp_gen/specification/friction_laws.py": ("tests/physics/test_friction_laws.py",),
     "generator/seat.py": ("tests/physics/test_uplift.py",),
