@@ -284,7 +284,8 @@ def sources(rows: Mapping[str, tuple[str, ...]], pattern: str) -> dict[str, str]
     found = {}
     for row, folders in rows.items():
         for folder in folders:
-            for path in sorted(ROOT.glob(folder if folder.endswith(pattern[1:]) else f"{folder}/{pattern}")):
+            place = ROOT / folder
+            for path in [place] if place.is_file() else sorted(place.glob(pattern)):
                 found[path.relative_to(ROOT).as_posix()] = row
     return found
 
