@@ -87,9 +87,8 @@ C = {
     "buildings/compiled": ("msfp_gen/buildings/compiled",),
     "studies/estimation/compiled": ("msfp_gen/studies/estimation/compiled",),
 }
-INTERFACE = {
-    "embedding/assets/fmi": ("msfp_gen/embedding/assets/fmi",)
-}  # the functions of the standard for units (FMU)
+# The functions of the standard for units (FMU).
+INTERFACE = {"embedding/assets/fmi": ("msfp_gen/embedding/assets/fmi",)}
 EMITTED = frozenset(path.name.removesuffix(".jinja") for path in (ROOT / "templates").glob("*.[ch].jinja"))
 
 # A compiler that counts lines. What gcov needs later, notes and sources, is kept in the folder into which libgcov writes

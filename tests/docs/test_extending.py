@@ -28,7 +28,7 @@ WHERE = {
     (LAWS, "        TEMPERATURE,\n"): entries(MEMORY),
     ("msfp_gen/specification/friction_laws.py", "HYSTERESIS = {\n"): SWITCHES,
     ("msfp_gen/specification/friction_laws.py", "SPIN = {\n"): SEAL,
-    ("msfp_gen/specification/friction_laws.py", "_NUMBERS: tuple[Value, ...] = ("): f"{SEAL_NUMBER.strip()},",
+    ("msfp_gen/specification/friction_laws.py", "_SPIN_NUMBERS: tuple[Value, ...] = ("): f"{SEAL_NUMBER.strip()},",
     ("msfp_gen/scene/bearing.py", "    friction_slow: Annotated[float | None"): FIELD + FIELDS + SEAL_FIELD,
     ("tests/reference/forces.py", "DRILLING = {\n"): DRILLING,
 }
