@@ -214,6 +214,20 @@ def description(spec: ModelSpec) -> str:
     )
 
 
+def extreme_entries(spec: ModelSpec) -> Iterator[str]:
+    """Entries of the table of extremes in C, one for each field of `contract.extremes`."""
+    fields_of = {field.name: field for field in contract.row(spec.effects)}
+    for extreme in contract.extremes(spec.effects):
+        vector = extreme.shape == (4,)
+        field = fields_of.get(extreme.of)
+        pair = field is not None and field.shape[1:] == (2,)
+        count, stride = ("4", 1) if vector else ("MSFP_NB", 2 if pair else 1)
+        how = "VECTOR" if vector else "LENGTH" if pair else "NUMBER"
+        of = "MSFP_ACROSS" if field is None else f"MSFP_ROW_{extreme.of.upper()}"
+        flags = ", ".join(str(int(flag)) for flag in (extreme.least, extreme.positions, extreme.loaded))
+        yield f"{count}, {of}, {stride}, MSFP_{how}, {flags}"
+
+
 def emit(
     equations: Equations,
     kernels: tuple[Kernel, ...],
@@ -255,6 +269,7 @@ def emit(
         "words": word_enums(),
         "row": contract.row(spec.effects),
         "extremes": contract.extremes(spec.effects),
+        "extreme_entries": list(extreme_entries(spec)),
         "columns": {"body": contract.names(contract.BODY), "top": contract.names(contract.TOP)},
         "names": {kind: tuple(name for name, *_ in entries) for kind, *_, entries in word_enums()},
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),

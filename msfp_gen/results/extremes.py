@@ -11,8 +11,9 @@ import numpy as np
 from msfp_gen.common.arrays import Array, parts
 from msfp_gen.results.history import LABELS, History
 from msfp_gen.results.sliding import separated
+from msfp_gen.specification import contract
 
-LEAST = ("gap", "least_normal", "least_friction")  # of these the least value counts, of all others the largest
+LEAST = {extreme.name for extreme in contract.EXTREMES if extreme.least}  # of all others the largest counts
 
 
 @dataclass(frozen=True, eq=False)

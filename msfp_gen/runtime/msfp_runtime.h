@@ -325,8 +325,6 @@ enum {
     MSFP_INTEGRATED = (offsetof(msfp_state, a) - offsetof(msfp_state, v)) / sizeof(double), /* numbers from v to work */
     MSFP_INTEGRATED_MOTION = MSFP_INTEGRATED - MSFP_WORKS                                   /* from v to memory */
 };
-/* The numbers of a state, or of its columns, from a field on. */
-#define MSFP_NUMBERS(type, state, field) ((double *)((char *)(state) + offsetof(type, field)))
 
 /* An interpolation node inside the last step. */
 typedef struct {
@@ -343,8 +341,8 @@ typedef struct {
     double power[MSFP_WORKS];/* before it [W] */
     double jerk[MSFP_NB];    /* third divided difference of theta [rad/s^3] */
     double span;             /* length of the last two steps [s]; 0: there were not two */
-    double load[6], top[3], tilt,
-        normal[MSFP_NB]; /* at its end: load, r_nn from the base [m], tilt of the top [rad], N [N] */
+    /* At its end: force of the load and its moment about E2; r_nn from the base [m] and tilt of the top [rad]; N. */
+    double load[4], way[4], normal[MSFP_NB];
 } msfp_step_history;
 #endif
 

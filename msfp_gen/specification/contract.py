@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from msfp_gen.common.fields import Quantity
 from msfp_gen.specification import friction_laws
@@ -337,6 +337,7 @@ class Recorded:
     needs: str = ""
 
 
+_Field = TypeVar("_Field", bound=Recorded)
 _N = Extent.SURFACES
 _MOTION = (_N, Extent.COORDINATES)
 _ROW = (
@@ -370,17 +371,36 @@ _ROW = (
 )
 
 
-_EXTREMES = (
-    Recorded("displacement", (4,), "m", "largest magnitude along E1, E2, E3 and in the horizontal plane"),
-    Recorded("top_force", (4,), "N", "largest magnitude along E1, E2, E3 and in the horizontal plane"),
-    Recorded("sliding", (_N,), "m", "largest sliding displacement"),
-    Recorded("gap", (_N,), "m", "least gap to the rim"),
-    Recorded("slip_speed", (_N,), "m/s", "largest slip velocity"),
-    Recorded("least_normal", (_N,), "N", "least normal force"),
-    Recorded("most_normal", (_N,), "N", "largest normal force"),
-    Recorded("least_friction", (_N,), "-", "least friction coefficient", "law"),
-    Recorded("most_friction", (_N,), "-", "largest friction coefficient", "law"),
-    Recorded("temperature", (_N,), "degC", "highest temperature", "heat"),
+ACROSS = "across"
+"""Displacement across the bearing: base less top, less the same at the start. No field of a row has it."""
+
+
+@dataclass(frozen=True)
+class Extreme(Recorded):
+    """Extremes of a field of the rows: of each surface, or of a vector, along E1, E2, E3 and in the horizontal plane.
+
+    of: the field, or `ACROSS`. least: the least counts, otherwise the largest. positions: it follows from positions
+    alone. loaded: only surfaces that carry a normal force count.
+    """
+
+    of: str = ""
+    least: bool = False
+    positions: bool = False
+    loaded: bool = False
+
+
+_VECTOR = "largest magnitude along E1, E2, E3 and in the horizontal plane"
+EXTREMES = (
+    Extreme("displacement", (4,), "m", _VECTOR, of=ACROSS, positions=True),
+    Extreme("top_force", (4,), "N", _VECTOR, of="top_force"),
+    Extreme("sliding", (_N,), "m", "largest sliding displacement", of="sliding", positions=True),
+    Extreme("gap", (_N,), "m", "least gap to the rim", of="gap", least=True, positions=True),
+    Extreme("slip_speed", (_N,), "m/s", "largest slip velocity", of="slip", loaded=True),
+    Extreme("least_normal", (_N,), "N", "least normal force", of="normal", least=True),
+    Extreme("most_normal", (_N,), "N", "largest normal force", of="normal"),
+    Extreme("least_friction", (_N,), "-", "least friction coefficient", "law", of="mu", least=True),
+    Extreme("most_friction", (_N,), "-", "largest friction coefficient", "law", of="mu"),
+    Extreme("temperature", (_N,), "degC", "highest temperature", "heat", of="temperature"),
 )
 
 
@@ -389,12 +409,12 @@ def row(effects: Effects) -> tuple[Recorded, ...]:
     return _present(_ROW, effects)
 
 
-def extremes(effects: Effects) -> tuple[Recorded, ...]:
+def extremes(effects: Effects) -> tuple[Extreme, ...]:
     """Extremes that a run of a model with these effects records over all of its steps, in order."""
-    return _present(_EXTREMES, effects)
+    return _present(EXTREMES, effects)
 
 
-def _present(quantities: tuple[Recorded, ...], effects: Effects) -> tuple[Recorded, ...]:
+def _present(quantities: tuple[_Field, ...], effects: Effects) -> tuple[_Field, ...]:
     law, memory = effects.law, None if effects.law is None else effects.law.memory
     has = {
         "": True,

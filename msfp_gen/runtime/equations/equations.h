@@ -166,6 +166,10 @@ void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
 void msfp_memory_point(const msfp_state *from, double beta, msfp_point *at);
 /* Parts of the memories after the evaluation in `w`, and their rates, into `s`. */
 void msfp_memory_state(const msfp_work *w, const msfp_state *from, double beta, msfp_state *s);
+/* Of one surface, or of its columns, of which each number has `width`: the sum of the parts without the source; the parts
+ * and their rates by the source. */
+void msfp_memory_past(const double *parts, double beta, int width, double *past);
+void msfp_memory_stage(const double *from, const double *source, double beta, int width, double *parts, double *rates);
 /* Largest error of a memory over its tolerance [-]; error: its estimate, s: the end of the step. */
 double msfp_memory_error(const msfp_run *run, const msfp_state *error, const msfp_state *s, double beta);
 #else

@@ -11,27 +11,38 @@
 
 static const double lambda[MSFP_MEMORY] = MSFP_MEMORY_RATES, weight[MSFP_MEMORY] = MSFP_MEMORY_WEIGHTS;
 
+void msfp_memory_past(const double *parts, double beta, int width, double *past)
+{
+    for (int c = 0; c < width; ++c)
+        past[c] = 0.0;
+    for (int i = 0; i < MSFP_MEMORY; ++i)
+        for (int c = 0; c < width; ++c)
+            past[c] += parts[i * width + c] / (1.0 + beta * lambda[i]);
+}
+
+void msfp_memory_stage(const double *from, const double *source, double beta, int width, double *parts, double *rates)
+{
+    for (int i = 0; i < MSFP_MEMORY; ++i)
+        for (int c = 0; c < width; ++c) {
+            const int at = i * width + c;
+            parts[at] = (from[at] + beta * weight[i] * source[c]) / (1.0 + beta * lambda[i]);
+            rates[at] = weight[i] * source[c] - lambda[i] * parts[at];
+        }
+}
+
 void msfp_memory_point(const msfp_state *from, double beta, msfp_point *at)
 {
     at->gain = 0.0;
     for (int i = 0; i < MSFP_MEMORY; ++i)
         at->gain += beta * weight[i] / (1.0 + beta * lambda[i]);
-    for (int j = 0; j < NB; ++j) {
-        at->past[j] = 0.0;
-        for (int i = 0; i < MSFP_MEMORY; ++i)
-            at->past[j] += from->memory[j][i] / (1.0 + beta * lambda[i]);
-    }
+    for (int j = 0; j < NB; ++j)
+        msfp_memory_past(from->memory[j], beta, 1, &at->past[j]);
 }
 
 void msfp_memory_state(const msfp_work *w, const msfp_state *from, double beta, msfp_state *s)
 {
-    for (int j = 0; j < NB; ++j) {
-        const double source = w->contact[j][MSFP_CONTACT_SOURCE];
-        for (int i = 0; i < MSFP_MEMORY; ++i) {
-            s->memory[j][i] = (from->memory[j][i] + beta * weight[i] * source) / (1.0 + beta * lambda[i]);
-            s->dmemory[j][i] = weight[i] * source - lambda[i] * s->memory[j][i];
-        }
-    }
+    for (int j = 0; j < NB; ++j)
+        msfp_memory_stage(from->memory[j], &w->contact[j][MSFP_CONTACT_SOURCE], beta, 1, s->memory[j], s->dmemory[j]);
 }
 
 /* At rtol = 1e-3 the tolerance is a hundredth of the scale (of a temperature a tenth of a degree) and a hundredth of the

@@ -115,9 +115,11 @@ static void stages_ended(msfp_run *run, const msfp_stages *s, int ringing)
 static void before_step(msfp_run *run)
 {
     run->gradients->recording.known = 0;
-    run->gradients->extremes = run->extremes;
-    run->gradients->outward_rate = run->outward_rate;
+    for (int i = 0; i < MSFP_EXTREME_COUNT; ++i)
+        run->gradients->extreme_share[i] = MSFP_NOT_TAKEN;
 }
+
+static void extreme_taken(msfp_run *run, int index, double share) { run->gradients->extreme_share[index] = share; }
 
 static void step_accepted(msfp_run *run)
 {
@@ -170,6 +172,7 @@ static const struct msfp_hooks hooks = {
     .stage_solved = stage_solved,
     .stages_ended = stages_ended,
     .before_step = before_step,
+    .extreme_taken = extreme_taken,
     .step_recorded = msfp_accepted_step_columns,
     .step_accepted = step_accepted,
     .place_of_node = place_of_node,
@@ -221,7 +224,7 @@ void msfp_gradient_extremes(const msfp_run *run, int parameter, double *out)
     if (!run->gradients || parameter < 0 || parameter >= run->gradients->count)
         return;
     const msfp_parameter_batch *batch = &run->gradients->batch[parameter / C];
-    for (size_t i = 0; i < sizeof(msfp_extremes) / sizeof(double); ++i)
+    for (int i = 0; i < MSFP_EXTREME_COUNT; ++i)
         out[i] = batch->extremes[i][parameter % C];
 }
 #endif

@@ -129,11 +129,12 @@ typedef msfp_columns msfp_row_columns[MSFP_ROW_SIZE];
 typedef struct {
     MSFP_STATE_FIELDS(msfp_columns)
 } msfp_state_columns;
+MSFP_STATIC_ASSERT(sizeof(msfp_state_columns) == MSFP_COLUMNS * offsetof(msfp_state, energy), state_columns);
 
 #if MSFP_CLOSED_FORM
 /* Of what the work of a quasi-static step follows from (msfp_step_history): powers before it, and at its end. */
 typedef struct {
-    msfp_columns power[MSFP_WORKS], load[6], top[3], tilt, normal[MSFP_NB];
+    msfp_columns power[MSFP_WORKS], load[4], way[4], normal[MSFP_NB];
 } msfp_history_columns;
 #endif
 
@@ -150,7 +151,7 @@ typedef struct {
     int complete;
     msfp_row_columns start_row, end_row; /* of the rows at the ends of the step, where they are known */
     int start_known, end_known;
-    msfp_columns extremes[sizeof(msfp_extremes) / sizeof(double)];
+    msfp_columns extremes[MSFP_EXTREME_COUNT];
 #if MSFP_CLOSED_FORM
     msfp_history_columns history;
 #endif
@@ -163,7 +164,7 @@ typedef struct {
     msfp_work work[MSFP_STAGES];
     msfp_slopes slopes[MSFP_STAGES];
     int all_slopes; /* whether those of the last stage are complete */
-    int ringing; /* whether the step integrates its works as where rates ring (refine_integrals of implicit.c) */
+    int ringing; /* whether the step integrates its works as where rates ring (msfp_refine_works) */
     double factors[MSFP_STAGES][MSFP_DOF * MSFP_DOF];
     int pivots[MSFP_STAGES][MSFP_DOF];
 } msfp_stage_history;
@@ -177,11 +178,12 @@ typedef struct {
     int known, sloped[MSFP_NODES + 2]; /* whether `value` and `node`, and one of `slopes`, are */
     msfp_row_columns d[MSFP_NODES + 2], row;
     int columns_known; /* whether `d` is */
-    msfp_columns contributed[sizeof(msfp_extremes) / sizeof(double)]; /* of a row to the extremes */
     msfp_observation own;
     msfp_slopes own_slopes;
     msfp_work_columns work;
 } msfp_recording;
+
+#define MSFP_NOT_TAKEN (-1.0)
 
 struct msfp_gradients {
     int count, batches; /* parameters, and batches of MSFP_COLUMNS of them */
@@ -195,16 +197,12 @@ struct msfp_gradients {
     size_t row_count, row_capacity;
     double *events; /* [event][parameter]: time, displacement, top force */
     size_t event_count, event_capacity;
-    msfp_extremes extremes; /* before the step */
-    double outward_rate;    /* likewise */
-    double event_time;      /* of the last rim contact or release [s] */
+    double extreme_share[MSFP_EXTREME_COUNT]; /* of the last step, where it took this extreme; else MSFP_NOT_TAKEN */
+    double event_time;                        /* of the last rim contact or release [s] */
     msfp_run own;           /* the run, while a step to an event is taken once more */
 };
 
 /* ---- initial_columns.c, step_columns.c: states ---- */
-
-/* The numbers of the columns of a state from a field on. */
-#define MSFP_COLUMN_NUMBERS(state, field) MSFP_NUMBERS(msfp_state_columns, state, field)
 
 /* sum += weight * columns, of `count` numbers */
 MSFP_INLINE void msfp_add_columns(msfp_columns *sum, const msfp_columns *columns, double weight, int count)

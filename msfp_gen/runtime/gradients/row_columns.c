@@ -52,15 +52,6 @@ static void node_columns(msfp_run *run, msfp_parameter_batch *batch, int index, 
     observed_columns(run, batch, o, &r->slopes[index], s, ds, d);
 }
 
-/* Columns of the accelerations at a share of the step. */
-static void accelerations_inside(const msfp_parameter_batch *batch, double share, msfp_state_columns *to)
-{
-    const double *a = batch->now.a[0][0], *b = batch->next.a[0][0];
-    double *out = to->a[0][0];
-    for (int i = 0; i < NB * NQ * C; ++i)
-        out[i] = (1.0 - share) * a[i] + share * b[i];
-}
-
 /* Columns of the rows at the ends and nodes of the step, into the recording, unless they are there. */
 static void all_node_columns(msfp_run *run, msfp_parameter_batch *batch)
 {
@@ -79,7 +70,7 @@ static void all_node_columns(msfp_run *run, msfp_parameter_batch *batch)
         msfp_state_columns *node = &batch->node[i - 1];
         for (int c = 0; c < C; ++c)
             node->t[c] = batch->now.t[c] + share * batch->h[c];
-        accelerations_inside(batch, share, node);
+        msfp_linear_rates((const double *)&batch->now, (const double *)&batch->next, share, C, (double *)node);
         node_columns(run, batch, i, &run->node[i - 1].state, node, r->d[i]);
     }
     msfp_row_reached_columns(run, batch);
@@ -106,60 +97,43 @@ static void weight_slopes(const msfp_run *run, double share, double *slopes)
     }
 }
 
-/* The bound of limit_friction in output.c: |(Y, Z)| no larger than in the rows that a row is interpolated from. */
-static void limit_friction(const msfp_recording *rows, int count, const msfp_row *row, msfp_row_columns d)
+/* Columns of Y, Z where msfp_limit_row has scaled them to the size of those of another row. */
+static void limit_friction(const msfp_recording *rows, const msfp_row *row, const msfp_row_limits *limits,
+                           msfp_row_columns d)
 {
     for (int j = 0; j < NB; ++j) {
-        double most = 1.0;
-        const double size = msfp_hypot(row->f[j][0], row->f[j][1]);
-        int at = -1;
-        if (size <= most)
-            continue;
-        for (int r = 0; r < count; ++r)
-            if (msfp_hypot(rows->value[r].f[j][0], rows->value[r].f[j][1]) > most) {
-                most = msfp_hypot(rows->value[r].f[j][0], rows->value[r].f[j][1]);
-                at = r;
-            }
-        for (int c = 0; c < C && size > most; ++c) {
-            double *const columns[2] = { d[MSFP_ROW_F + 2 * j], d[MSFP_ROW_F + 2 * j + 1] };
-            double dsize = 0.0, dmost = 0.0;
+        const double most = limits->most[j], share = limits->share[j];
+        const int of = limits->row[j];
+        for (int c = 0; c < C && share < 1.0; ++c) {
+            double outward = 0.0, further = 0.0;
             for (int i = 0; i < 2; ++i) {
-                dsize += row->f[j][i] * columns[i][c] / size;
-                dmost += at < 0 ? 0.0
-                                : rows->value[at].f[j][i] * rows->d[at][MSFP_ROW_F + 2 * j + i][c] / most;
+                outward += row->f[j][i] / most * d[MSFP_ROW_F + 2 * j + i][c];
+                further += of < 0 ? 0.0 : rows->value[of].f[j][i] / most * rows->d[of][MSFP_ROW_F + 2 * j + i][c];
             }
-            for (int i = 0; i < 2; ++i)
-                columns[i][c] = columns[i][c] * most / size + row->f[j][i] * (dmost - most * dsize / size) / size;
+            for (int i = 0; i < 2; ++i) {
+                double *column = &d[MSFP_ROW_F + 2 * j + i][c];
+                *column = share * *column + row->f[j][i] / most * (further - share * outward);
+            }
         }
     }
 }
 
-static void clear(msfp_columns *columns, int count) { memset(columns, 0, count * sizeof *columns); }
-
-/* As restore_bounds of output.c. row: the row before its bounds are restored. */
-static void restore_bounds(msfp_run *run, msfp_parameter_batch *batch, const msfp_row *row, msfp_row_columns d)
+/* Columns where msfp_limit_row has restored the bounds of a row. */
+static void restore_bounds(msfp_run *run, msfp_parameter_batch *batch, const msfp_row *row,
+                           const msfp_row_limits *limits, msfp_row_columns d)
 {
     msfp_columns gaps[NB][MSFP_GAP_SIZE];
     double sliding[NB][MSFP_GAP_SIZE];
     msfp_gaps_columns(&run->parameters, &batch->parameters, row->q, (msfp_columns(*)[NQ])(d + MSFP_ROW_Q), sliding,
                       gaps);
-    if (row->kinetic < 0.0)
-        clear(&d[MSFP_ROW_KINETIC], 1);
-    if (row->rim_stored < 0.0)
-        clear(&d[MSFP_ROW_RIM_STORED], 1);
-    if (row->seat_stored < 0.0)
-        clear(&d[MSFP_ROW_SEAT_STORED], 1);
     for (int j = 0; j < NB; ++j) {
-        if (row->normal[j] < 0.0) {
-            clear(&d[MSFP_ROW_NORMAL + j], 1);
-            clear(&d[MSFP_ROW_FORCE + 3 * j], 3);
-        }
         memcpy(d[MSFP_ROW_SLIDING + j], gaps[j][MSFP_GAP_S], sizeof *d);
         if (!MSFP_UPLIFT)
             memcpy(d[MSFP_ROW_GAP + j], gaps[j][MSFP_GAP_G], sizeof *d);
-        if ((MSFP_UPLIFT ? row->gap[j] : sliding[j][MSFP_GAP_G]) > 0.0 || row->rim[j] < 0.0)
-            clear(&d[MSFP_ROW_RIM + j], 1);
     }
+    for (int i = 0; i < MSFP_ROW_SIZE; ++i)
+        if (limits->zero[i])
+            memset(d[i], 0, sizeof *d);
 }
 
 MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batch *batch, double share, int moving,
@@ -172,6 +146,7 @@ MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batc
     const double *values[MSFP_NODES + 2], *columns[MSFP_NODES + 2];
     msfp_columns moved; /* of the share */
     msfp_row blended;
+    msfp_row_limits limits;
     for (int r = 0; r < w.count; ++r) {
         values[r] = (const double *)&rows->value[r];
         columns[r] = rows->d[r][0];
@@ -186,8 +161,9 @@ MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batc
         msfp_weigh(slopes, w.count, values, MSFP_ROW_SIZE, slope);
         msfp_add_scaled(d, slope, moved, 1.0, MSFP_ROW_SIZE);
     }
-    limit_friction(rows, w.count, &blended, d);
-    restore_bounds(run, batch, &blended, d);
+    msfp_limit_row(run, rows->value, w.count, &blended, &limits);
+    limit_friction(rows, &blended, &limits, d);
+    restore_bounds(run, batch, &blended, &limits, d);
 }
 
 void msfp_row_reached_columns(msfp_run *run, msfp_parameter_batch *batch)
@@ -206,17 +182,13 @@ void msfp_row_reached_columns(msfp_run *run, msfp_parameter_batch *batch)
 void msfp_row_of_cubic_columns(msfp_run *run, msfp_parameter_batch *batch, double share, msfp_row *row,
                                msfp_row_columns d)
 {
-    const msfp_state_columns *a = &batch->now, *b = &batch->next;
+    const double *now = (const double *)&batch->now, *next = (const double *)&batch->next;
     msfp_state_columns *ds = &batch->node[0];
-    const double h = run->next.t - run->now.t;
     msfp_state s;
     msfp_interpolate(run, share, &s);
-    *ds = *a;
-    msfp_hermite(MSFP_COLUMN_NUMBERS(a, q), MSFP_COLUMN_NUMBERS(a, v), MSFP_COLUMN_NUMBERS(b, q), MSFP_COLUMN_NUMBERS(b, v), h, share, MSFP_COORDINATES * C,
-                 MSFP_COLUMN_NUMBERS(ds, q));
-    msfp_hermite(MSFP_COLUMN_NUMBERS(a, v), MSFP_COLUMN_NUMBERS(a, a), MSFP_COLUMN_NUMBERS(b, v), MSFP_COLUMN_NUMBERS(b, a), h, share, MSFP_INTEGRATED_MOTION * C,
-                 MSFP_COLUMN_NUMBERS(ds, v));
-    accelerations_inside(batch, share, ds);
+    memcpy(ds->t, batch->now.t, sizeof ds->t);
+    msfp_cubics(now, next, run->next.t - run->now.t, share, C, (double *)ds);
+    msfp_linear_rates(now, next, share, C, (double *)ds);
     msfp_observe_state(run, &s, row);
     msfp_observe_columns(run, batch, &s, ds, d);
 }

@@ -18,17 +18,13 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_parameter_batch *batch,
 {
     const msfp_stage_history *stage_history = &run->gradients->stage_history;
     const double beta = stage_history->stage[i].beta;
-    const int count = run->gradients->energies ? MSFP_INTEGRATED : MSFP_INTEGRATED_MOTION;
     memcpy(from, &batch->now, offsetof(msfp_state_columns, a));
-    for (int j = 0; j < i; ++j) {
-        const double weight = method->a[i][j];
-        const msfp_state *state = &stage_history->state[j];
-        msfp_add(MSFP_COLUMN_NUMBERS(from, q), MSFP_COLUMN_NUMBERS(&stages[j], v), h * weight, MSFP_COORDINATES * C);
-        msfp_add(MSFP_COLUMN_NUMBERS(from, v), MSFP_COLUMN_NUMBERS(&stages[j], a), h * weight, count * C);
-        if (msfp_any_column(batch->h)) {
-            msfp_add_scaled(from->q[0], MSFP_NUMBERS(msfp_state, state, v), batch->h, weight, MSFP_COORDINATES);
-            msfp_add_scaled(from->v[0], MSFP_NUMBERS(msfp_state, state, a), batch->h, weight, count);
-        }
+    msfp_sum_rates((double *)from, (const double *)stages, sizeof *stages / sizeof(double), method->a[i], i, h, C);
+    if (msfp_any_column(batch->h)) {
+        msfp_state rates = { 0 };
+        msfp_add_rates(&rates, stage_history->state, method->a[i], i, 1.0);
+        msfp_add_scaled(from->q[0], MSFP_FROM((const double *)&rates, q, 1), batch->h, 1.0,
+                        MSFP_COORDINATES + MSFP_INTEGRATED);
     }
     memcpy(dat->f, from->f, sizeof dat->f);
     memcpy(dat->foot, from->foot, sizeof dat->foot);
@@ -45,12 +41,8 @@ MSFP_INLINE void stage_point_columns(const msfp_run *run, int i, const msfp_stat
 {
     const msfp_stage *stage = &run->gradients->stage_history.stage[i];
     const double beta = stage->beta, rate = stage->inertia / beta;
-    for (int k = 0; k < NB; ++k)
-        for (int d = 0; d < NQ; ++d)
-            for (int c = 0; c < C; ++c) {
-                dat->q[k][d][c] = from->q[k][d][c] + beta * dat->v[k][d][c];
-                dat->a[k][d][c] = rate * (dat->v[k][d][c] - from->v[k][d][c]);
-            }
+    msfp_stage_formula(from->q[0][0], from->v[0][0], beta, rate, dat->v[0][0], MSFP_COORDINATES * C, dat->q[0][0],
+                       dat->a[0][0]);
     if (!msfp_any_column(dat->beta))
         return;
     msfp_add_scaled(dat->q[0], stage->at.v[0], dat->beta, 1.0, NB * NQ);

@@ -11,28 +11,15 @@
 #if MSFP_GRADIENTS
 enum { WORKS = MSFP_WORKS };
 
-/* work += columns of h weight power */
-MSFP_INLINE void add_product(const msfp_parameter_batch *batch, double h, double weight, double power,
-                             const double *dpower, double *work)
-{
-    for (int c = 0; c < C; ++c)
-        work[c] += weight * (h * dpower[c] + batch->h[c] * power);
-}
-
-/* As refine_integrals of implicit.c. */
+/* The columns of msfp_refine_works. */
 static void refine(const msfp_run *run, const msfp_parameter_batch *batch, const msfp_tableau *method, double h,
                    const msfp_state_columns *stages, msfp_columns work[WORKS])
 {
-    const msfp_stage_history *stage_history = &run->gradients->stage_history;
-    for (int j = 0; j < method->stages && method->order <= 3.0; ++j) {
-        const msfp_state *state = &stage_history->state[j];
-        if (stage_history->ringing)
-            add_product(batch, h, -method->e[j], state->prescribed_power, stages[j].prescribed_power,
-                        work[MSFP_WORK_INPUT]);
-        for (int e = 0; e < WORKS && !stage_history->ringing; ++e)
-            if (e != MSFP_WORK_FRICTION_STORED)
-                add_product(batch, h, -method->e[j], state->power[e], stages[j].power[e], work[e]);
-    }
+    const msfp_stage_history *s = &run->gradients->stage_history;
+    double rates[WORKS] = { 0.0 };
+    msfp_refine_works(method, (const double *)stages, sizeof *stages / sizeof(double), h, s->ringing, C, work[0]);
+    msfp_refine_works(method, (const double *)s->state, sizeof *s->state / sizeof(double), 1.0, s->ringing, 1, rates);
+    msfp_add_scaled(work, rates, batch->h, 1.0, WORKS);
 }
 
 MSFP_COLUMNWISE void msfp_stage_works(msfp_run *run, msfp_parameter_batch *batch, int i, const msfp_state_columns *from,
@@ -48,10 +35,9 @@ MSFP_COLUMNWISE void msfp_stage_works(msfp_run *run, msfp_parameter_batch *batch
                            &batch->work);
     msfp_columns_of_powers(&run->parameters, &batch->parameters, &stage->at, &batch->point, &stage_history->work[i],
                            &batch->work, to);
-    for (int e = 0; e < WORKS; ++e) {
-        memcpy(to->work[e], from->work[e], sizeof to->work[e]);
-        add_product(batch, h, method->gamma, stage_history->state[i].power[e], to->power[e], to->work[e]);
-    }
+    memcpy(to->work, from->work, sizeof to->work);
+    msfp_add_columns(to->work, (const msfp_columns *)to->power, h * method->gamma, WORKS);
+    msfp_add_scaled(to->work, stage_history->state[i].power, batch->h, method->gamma, WORKS);
     if (i < method->stages - 1)
         return;
     refine(run, batch, method, h, stages, to->work);
@@ -68,12 +54,13 @@ static void ends(const msfp_parameter_batch *batch, const msfp_state_columns *be
 {
     const msfp_point_columns *dat = &batch->point;
     memcpy(to->power, before->power, sizeof to->power);
-    memcpy(to->load, dat->load, sizeof to->load);
-    memcpy(to->tilt, dat->base[0][3 + ANGLE], sizeof to->tilt);
-    msfp_get_polar(batch->work.body[NB] + MSFP_BODY_CX * C, to->top);
-    msfp_add_columns(to->top, dat->base[0], -1.0, 3);
+    msfp_get_polar(batch->work.body[NB] + MSFP_BODY_CX * C, to->way);
+    msfp_add_columns(to->way, dat->base[0], -1.0, 3);
+    memcpy(to->load, dat->load, 3 * sizeof *to->load);
+    memcpy(to->load[3], dat->load[3 + ANGLE], sizeof *to->load);
+    memcpy(to->way[3], dat->base[0][3 + ANGLE], sizeof *to->way);
     for (int k = 0; k < NB; ++k) {
-        msfp_add_columns(&to->tilt, &dat->q[k][ANGLE], 1.0, 1);
+        msfp_add_columns(&to->way[3], &dat->q[k][ANGLE], 1.0, 1);
         memcpy(to->normal[k], batch->work.contact[k] + MSFP_CONTACT_N * C, sizeof to->normal[k]);
     }
 }
@@ -102,31 +89,23 @@ static void friction_work(const msfp_run *run, const msfp_parameter_batch *batch
     }
 }
 
-/* sum += columns of mean force times distance, from the values a and b of both at the ends of the step. */
-MSFP_INLINE void add_mean(double force_a, const double *dforce_a, double force_b, const double *dforce_b, double way_a,
-                          const double *dway_a, double way_b, const double *dway_b, double *sum)
-{
-    for (int c = 0; c < C; ++c)
-        sum[c] += 0.5 * ((dforce_a[c] + dforce_b[c]) * (way_b - way_a) + (force_a + force_b) * (dway_b[c] - dway_a[c]));
-}
-
 /* As load_work of quasistatic.c. */
 static void load_work(const msfp_run *run, const msfp_parameter_batch *batch, const msfp_history_columns *db,
                       double *input)
 {
     const msfp_step_history *a = &run->step_history, *b = &run->next_step_history;
     const msfp_history_columns *da = &batch->history;
-    enum { TURN = 3 + ANGLE };
-    add_mean(a->load[TURN], da->load[TURN], b->load[TURN], db->load[TURN], a->tilt, da->tilt, b->tilt, db->tilt, input);
-    for (int i = 0; i < 3; ++i)
-        add_mean(a->load[i], da->load[i], b->load[i], db->load[i], a->top[i], da->top[i], b->top[i], db->top[i], input);
+    for (int i = 0; i < 4; ++i)
+        for (int c = 0; c < C; ++c)
+            input[c] += 0.5 * (da->load[i][c] + db->load[i][c]) * (b->way[i] - a->way[i]) +
+                        0.5 * (a->load[i] + b->load[i]) * (db->way[i][c] - da->way[i][c]);
 }
 
 /* As count_work of quasistatic.c: lengths of these steps do not depend on the parameters. */
 void msfp_quasistatic_works(msfp_run *run, msfp_parameter_batch *batch)
 {
     const msfp_stage_history *stage_history = &run->gradients->stage_history;
-    const double h = run->next.t - run->now.t, last = run->step_history.h, curved = h * h * h / 6.0;
+    const double h = run->next.t - run->now.t;
     const msfp_state_columns *now = &batch->now;
     msfp_state_columns *next = &batch->next;
     msfp_columns *work = next->work;
@@ -134,12 +113,7 @@ void msfp_quasistatic_works(msfp_run *run, msfp_parameter_batch *batch)
     msfp_columns_of_powers(&run->parameters, &batch->parameters, &stage_history->stage[1].at, &batch->point,
                            &stage_history->work[1], &batch->work, next);
     msfp_add_columns(&next->power[MSFP_WORK_INPUT], (const msfp_columns *)&next->load_power, -1.0, 1);
-    for (int e = 0; e < WORKS; ++e)
-        for (int c = 0; c < C && e != MSFP_WORK_FRICTION_DISSIPATED && e != MSFP_WORK_FRICTION_STORED; ++c) {
-            const double a = now->power[e][c], b = next->power[e][c], before = batch->history.power[e][c];
-            const double bend = last > 0.0 ? ((b - a) / h - (a - before) / last) / (h + last) : 0.0;
-            work[e][c] += 0.5 * h * (a + b) - bend * curved;
-        }
+    msfp_parabola_works(batch->history.power[0], now->power[0], next->power[0], run->step_history.h, h, C, work[0]);
     ends(batch, now, &reached);
     friction_work(run, batch, &reached, work);
     load_work(run, batch, &reached, work[MSFP_WORK_INPUT]);

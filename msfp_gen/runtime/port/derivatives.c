@@ -34,13 +34,6 @@ typedef struct {
     msfp_by_ends d;
 } moved;
 
-/* The state to += factor times the rates of another one. */
-static void add(state_columns *to, const state_columns *from, double factor)
-{
-    msfp_add(MSFP_NUMBERS(state_columns, to, q), MSFP_NUMBERS(state_columns, from, v), factor, MSFP_COORDINATES * W);
-    msfp_add(MSFP_NUMBERS(state_columns, to, v), MSFP_NUMBERS(state_columns, from, a), factor, MSFP_INTEGRATED_MOTION * W);
-}
-
 /* Derivatives of the channels of an end along a direction, at its motion [order][6]; rates: not of second derivatives. */
 static void channels_by_freedoms(const double *motion, const double direction[MSFP_ORDERS], int end, int rates,
                                  columns (*of)[EACH])
@@ -104,23 +97,16 @@ static void differentiate(const msfp_parameters *p, const msfp_work *w, int bala
 /* Derivatives of coordinates and accelerations of a stage from those of the rates and of what is known before it. */
 static void point(const state_columns *known, double beta, state_columns *stage, msfp_by_ends *d)
 {
+    msfp_stage_formula(known->q[0][0], known->v[0][0], beta, 1.0 / beta, stage->v[0][0], MSFP_COORDINATES * W,
+                       stage->q[0][0], stage->a[0][0]);
     for (int k = 0; k < NB; ++k)
         for (int i = 0; i < ND; ++i) {
-            const int at = unknown[i];
-            columns *x[MSFP_ORDERS];
+            columns *orders[MSFP_ORDERS] = { &stage->q[k][unknown[i]], &stage->v[k][unknown[i]],
+                                             &stage->a[k][unknown[i]] };
             for (int order = 0; order < MSFP_ORDERS; ++order)
-                x[order] = (columns *)(d->x[k + 1] + msfp_unknown_field(order, i) * W);
-            for (int c = 0; c < W; ++c) {
-                (*x[0])[c] = stage->q[k][at][c] = known->q[k][at][c] + beta * stage->v[k][at][c];
-                (*x[1])[c] = stage->v[k][at][c];
-                (*x[2])[c] = stage->a[k][at][c] = (stage->v[k][at][c] - known->v[k][at][c]) / beta;
-            }
+                memcpy(d->x[k + 1] + msfp_unknown_field(order, i) * W, *orders[order], sizeof(columns));
         }
 }
-
-#if MSFP_MEMORY
-static const double decay[MSFP_MEMORY] = MSFP_MEMORY_RATES, weight[MSFP_MEMORY] = MSFP_MEMORY_WEIGHTS;
-#endif
 
 /* What the stage formulas of friction, memory and foot know of the earlier stages. */
 static void known_of_stage(const state_columns *known, double beta, msfp_by_ends *d)
@@ -128,10 +114,7 @@ static void known_of_stage(const state_columns *known, double beta, msfp_by_ends
     for (int j = 0; j < NB; ++j) {
         memcpy(d->before[j] + MSFP_BEFORE_Y * W, known->f[j], MSFP_SHEAR_SIZE * sizeof(columns));
 #if MSFP_MEMORY
-        double *past = d->before[j] + MSFP_BEFORE_PAST * W;
-        memset(past, 0, sizeof(columns));
-        for (int i = 0; i < MSFP_MEMORY * W; ++i)
-            past[i % W] += known->memory[j][i / W][i % W] / (1.0 + beta * decay[i / W]);
+        msfp_memory_past(known->memory[j][0], beta, W, d->before[j] + MSFP_BEFORE_PAST * W);
 #endif
     }
     for (int c = 0; c < W; ++c)
@@ -147,12 +130,8 @@ static void rest_of_stage(const state_columns *known, double beta, const msfp_by
     for (int j = 0; j < NB; ++j) {
         memcpy(stage->df[j], d->contact[j] + MSFP_CONTACT_DY * W, MSFP_SHEAR_SIZE * sizeof(columns));
 #if MSFP_MEMORY
-        const double *source = d->contact[j] + MSFP_CONTACT_SOURCE * W;
-        for (int i = 0; i < MSFP_MEMORY * W; ++i) {
-            stage->dmemory[j][i / W][i % W] = (weight[i / W] * source[i % W] - decay[i / W] * known->memory[j][i / W][i % W])
-                                            / (1.0 + beta * decay[i / W]);
-            stage->memory[j][i / W][i % W] = known->memory[j][i / W][i % W] + beta * stage->dmemory[j][i / W][i % W];
-        }
+        msfp_memory_stage(known->memory[j][0], d->contact[j] + MSFP_CONTACT_SOURCE * W, beta, W, stage->memory[j][0],
+                          stage->dmemory[j][0]);
 #endif
     }
     memcpy(stage->dfoot, d->foot + MSFP_FOOT_Y1 * W, sizeof stage->dfoot);
@@ -192,8 +171,8 @@ static void differentiate_stage(const msfp_port *port, const msfp_run *run, cons
     const double beta = stages->now.beta;
     state_columns known = m->stage[0], *stage = &m->stage[i];
     channels here[MSFP_ENDS];
-    for (int j = 0; j < i; ++j)
-        add(&known, &m->stage[j], stages->h * stages->method->a[i][j]);
+    msfp_sum_rates((double *)&known, (const double *)m->stage, sizeof known / sizeof(double), stages->method->a[i], i,
+                   stages->h, W);
     for (int e = 0; e < MSFP_ENDS; ++e)
         for (int order = 0; order < MSFP_ORDERS; ++order)
             for (int c = 0; c < COUNT; ++c) {

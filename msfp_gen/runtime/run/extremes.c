@@ -3,57 +3,65 @@
 #include <string.h>
 #include "run.h"
 
-static void take_largest(double *extreme, double value)
+/* A field of msfp_extremes: of surfaces, or of a vector along E1, E2, E3 and in the horizontal plane. */
+typedef struct {
+    int count, of, stride; /* how many numbers; where in a row the first is of, and the distance to the next */
+    int how;               /* as of msfp_extreme; MSFP_VECTOR: three magnitudes and a length */
+    int least;             /* whether the least counts, otherwise the largest */
+    int positions;         /* whether it follows from positions alone */
+    int loaded;            /* whether only surfaces count that carry a normal force */
+} field;
+
+static const field fields[] = { MSFP_EXTREMES };
+enum { FIELDS = sizeof fields / sizeof *fields };
+
+MSFP_INLINE msfp_extreme number_of(const field *f, int k)
 {
-    if (value > *extreme)
-        *extreme = value;
+    if (f->how != MSFP_VECTOR)
+        return (msfp_extreme){ f->of + k * f->stride, f->how };
+    return k < 3 ? (msfp_extreme){ f->of + k, MSFP_MAGNITUDE } : (msfp_extreme){ f->of, MSFP_LENGTH };
 }
 
-static void take_least(double *extreme, double value)
+msfp_extreme msfp_extreme_of(int index)
 {
-    if (value < *extreme)
-        *extreme = value;
+    const field *f = fields;
+    while (index >= f->count)
+        index -= f++->count;
+    return number_of(f, index);
 }
 
 static double length(const double *v) { return sqrt(v[0] * v[0] + v[1] * v[1]); }
 
-/* Largest magnitudes along the axes and in the horizontal plane. */
-static void take_vector(double extreme[4], const double vector[3])
+double msfp_extreme_value(msfp_extreme e, const msfp_row *row, const double *across, double slopes[2])
 {
-    for (int i = 0; i < 3; ++i)
-        take_largest(&extreme[i], fabs(vector[i]));
-    take_largest(&extreme[3], length(vector));
-}
-
-/* What follows from the positions alone. */
-static void take_positions(msfp_run *run, const msfp_row *row)
-{
-    double displacement[3];
-    msfp_displacement_across(run, row, displacement);
-    take_vector(run->extremes.displacement, displacement);
-    for (int j = 0; j < NB; ++j) {
-        take_largest(&run->extremes.sliding[j], row->sliding[j]);
-        take_least(&run->extremes.gap[j], row->gap[j]);
+    const double *u = e.of < MSFP_ACROSS ? (const double *)row + e.of : across + e.of - MSFP_ACROSS;
+    const double value = e.how == MSFP_LENGTH ? length(u) : e.how == MSFP_MAGNITUDE ? fabs(u[0]) : u[0];
+    if (slopes) {
+        slopes[0] = e.how == MSFP_NUMBER ? 1.0 : value > 0.0 ? u[0] / value : 0.0;
+        slopes[1] = e.how == MSFP_LENGTH && value > 0.0 ? u[1] / value : 0.0;
     }
+    return value;
 }
 
-static void take_row(msfp_run *run, const msfp_row *row)
+/* What is taken of a row: all; what follows from positions alone; the force at the top. */
+enum wanted { ALL, OF_POSITIONS, OF_TOP_FORCE };
+
+/* Extremes with a row at a share of the last step. */
+static void take(msfp_run *run, const msfp_row *row, double share, enum wanted wanted)
 {
-    msfp_extremes *e = &run->extremes;
-    take_positions(run, row);
-    take_vector(e->top_force, row->top_force);
-    for (int j = 0; j < NB; ++j) {
-        take_least(&e->least_normal[j], row->normal[j]);
-        take_largest(&e->most_normal[j], row->normal[j]);
-        if (row->normal[j] > 0.0) /* of a closed surface */
-            take_largest(&e->slip_speed[j], length(row->slip[j]));
-#if MSFP_LAW
-        take_least(&e->least_friction[j], row->mu[j]);
-        take_largest(&e->most_friction[j], row->mu[j]);
-#endif
-#if MSFP_HEAT
-        take_largest(&e->temperature[j], row->temperature[j]);
-#endif
+    double across[3], *extreme = (double *)&run->extremes;
+    (void)share; /* without gradients */
+    msfp_displacement_across(run, row, across);
+    for (const field *f = fields; f < fields + FIELDS; extreme += f++->count) {
+        if ((wanted == OF_POSITIONS && !f->positions) || (wanted == OF_TOP_FORCE && f->of != MSFP_ROW_TOP_FORCE))
+            continue;
+        for (int k = 0; k < f->count; ++k) {
+            const double value = msfp_extreme_value(number_of(f, k), row, across, NULL);
+            if ((f->loaded && !(row->normal[k] > 0.0)) || !(f->least ? value < extreme[k] : value > extreme[k]))
+                continue;
+            extreme[k] = value;
+            MSFP_HOOK(run, extreme_taken(run, (int)(extreme - (double *)&run->extremes) + k, share), (void)0);
+        }
     }
 }
 
@@ -78,19 +86,12 @@ static double outward_rate(const msfp_run *run, const msfp_point *at, const msfp
 
 void msfp_extremes_begin(msfp_run *run, const msfp_row *row)
 {
-    msfp_extremes *e = &run->extremes;
-    memset(e, 0, sizeof *e);
-    for (int j = 0; j < NB; ++j) {
-        e->gap[j] = row->gap[j];
-        e->least_normal[j] = e->most_normal[j] = row->normal[j];
-#if MSFP_LAW
-        e->least_friction[j] = e->most_friction[j] = row->mu[j];
-#endif
-#if MSFP_HEAT
-        e->temperature[j] = row->temperature[j];
-#endif
-    }
-    take_row(run, row);
+    memset(&run->extremes, 0, sizeof run->extremes);
+    for (int i = 0; i < MSFP_EXTREME_COUNT;
+         ++i) /* magnitudes begin at zero, numbers with a sign at their first value */
+        if (msfp_extreme_of(i).how == MSFP_NUMBER)
+            ((double *)&run->extremes)[i] = msfp_extreme_value(msfp_extreme_of(i), row, NULL, NULL);
+    take(run, row, 0.0, ALL);
     run->outward_rate = 0.0;
 }
 
@@ -104,7 +105,7 @@ static void take_nodes(msfp_run *run)
     for (int i = 0; i < run->node_count && msfp_control_order(run->options.method) > 3.0; ++i)
         if (length(run->node[i].top_force) > run->extremes.top_force[3]) {
             msfp_row_inside(run, run->node[i].share, &row);
-            take_vector(run->extremes.top_force, row.top_force);
+            take(run, &row, run->node[i].share, OF_TOP_FORCE);
         }
 }
 
@@ -117,12 +118,13 @@ void msfp_extremes_step(msfp_run *run)
         row = &run->rows[run->row_count - 1];
     else
         msfp_record(&run->parameters, &run->reached, &run->work, &run->next.mechanical, &own);
-    take_row(run, row);
+    take(run, row, 1.0, ALL);
     take_nodes(run);
     const double before = run->outward_rate, after = outward_rate(run, &run->reached, row);
     run->outward_rate = after;
     if (before > 0.0 && after < 0.0 && across(run, row) > near_extreme * run->extremes.displacement[3]) {
-        msfp_row_inside(run, before / (before - after), &own);
-        take_positions(run, &own);
+        const double share = before / (before - after);
+        msfp_row_inside(run, share, &own);
+        take(run, &own, share, OF_POSITIONS);
     }
 }

@@ -61,34 +61,55 @@ static void blend(const msfp_row *rows, const msfp_weights *w, msfp_row *out)
 }
 
 /* |(Y, Z)| no larger than in the rows that a row is interpolated from: at a reversal a polynomial may exceed them. */
-static void limit_friction(const msfp_row *rows, int count, msfp_row *row)
+static void limit_friction(const msfp_row *rows, int count, msfp_row *row, msfp_row_limits *limits)
 {
     for (int j = 0; j < NB; ++j) {
         double most = 1.0, size = msfp_hypot(row->f[j][0], row->f[j][1]);
-        for (int r = 0; r < count; ++r)
+        limits->row[j] = -1;
+        for (int r = 0; r < count; ++r) {
             /* `count` rows are set. NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage) */
-            most = fmax(most, msfp_hypot(rows[r].f[j][0], rows[r].f[j][1]));
+            const double other = msfp_hypot(rows[r].f[j][0], rows[r].f[j][1]);
+            if (other > most) {
+                most = other;
+                limits->row[j] = r;
+            }
+        }
+        limits->most[j] = most;
+        limits->share[j] = size > most ? most / size : 1.0;
         for (int d = 0; d < 2 && size > most; ++d)
             row->f[j][d] *= most / size;
     }
 }
 
-/* Restore what a polynomial does not keep: the sliding displacement, which has a kink at the centre, from the angles of
- * the row; normal forces, rim forces and energies that are not negative. */
-static void restore_bounds(const msfp_run *run, msfp_row *row)
+/* Set `count` numbers of a row to zero. */
+static void clear(msfp_row *row, int first, int count, msfp_row_limits *limits)
 {
+    for (int i = first; i < first + count; ++i) {
+        ((double *)row)[i] = 0.0;
+        limits->zero[i] = 1;
+    }
+}
+
+void msfp_limit_row(const msfp_run *run, const msfp_row *rows, int count, msfp_row *row, msfp_row_limits *limits)
+{
+    static const int not_negative[] = { MSFP_ROW_KINETIC, MSFP_ROW_RIM_STORED, MSFP_ROW_SEAT_STORED };
     const msfp_row *given = row;
     double sliding[NB][MSFP_GAP_SIZE];
-    msfp_gaps(&run->parameters, given->q, sliding);
-    row->kinetic = fmax(row->kinetic, 0.0);
-    row->rim_stored = fmax(row->rim_stored, 0.0);
-    row->seat_stored = fmax(row->seat_stored, 0.0);
+    memset(limits->zero, 0, sizeof limits->zero);
+    limit_friction(rows, count, row, limits);
+    for (int i = 0; i < 3; ++i)
+        if (((double *)row)[not_negative[i]] < 0.0)
+            clear(row, not_negative[i], 1, limits);
+    msfp_gaps(&run->parameters, given->q, sliding); /* the sliding displacement has a kink at the centre */
     for (int j = 0; j < NB; ++j) {
-        if (row->normal[j] < 0.0)
-            row->normal[j] = row->force[j][0] = row->force[j][1] = row->force[j][2] = 0.0;
+        if (row->normal[j] < 0.0) {
+            clear(row, MSFP_ROW_NORMAL + j, 1, limits);
+            clear(row, MSFP_ROW_FORCE + 3 * j, 3, limits);
+        }
         row->sliding[j] = sliding[j][MSFP_GAP_S];
         row->gap[j] = MSFP_UPLIFT ? row->gap[j] : sliding[j][MSFP_GAP_G]; /* with uplift it follows the separation too */
-        row->rim[j] = row->gap[j] > 0.0 ? 0.0 : fmax(row->rim[j], 0.0); /* a rim only pushes, and only in contact */
+        if (row->gap[j] > 0.0 || row->rim[j] < 0.0) /* a rim only pushes, and only in contact */
+            clear(row, MSFP_ROW_RIM + j, 1, limits);
     }
 }
 
@@ -135,12 +156,12 @@ static void observe_nodes(msfp_run *run, msfp_row rows[MSFP_NODES + 2])
 static void row_between(msfp_run *run, const msfp_row *rows, double share, msfp_row *row)
 {
     msfp_state s;
+    msfp_row_limits limits;
     msfp_interpolate(run, share, &s);
     if (run->node_count) {
         const msfp_weights w = msfp_weights_at(run, share);
         blend(rows, &w, row);
-        limit_friction(rows, w.count, row);
-        restore_bounds(run, row);
+        msfp_limit_row(run, rows, w.count, row, &limits);
     } else
         msfp_observe_state(run, &s, row);
     memcpy(row->work, s.work, sizeof row->work);

@@ -30,6 +30,17 @@ void msfp_monitor_begin(msfp_run *run);
 
 /* ---- extremes.c ---- */
 
+enum { MSFP_EXTREME_COUNT = sizeof(msfp_extremes) / sizeof(double), MSFP_ACROSS = MSFP_ROW_SIZE };
+/* How a number of msfp_extremes follows from a row. */
+typedef struct {
+    int of; /* the first number of the row that it is of; from MSFP_ACROSS on: displacement across the bearing */
+    enum { MSFP_NUMBER, MSFP_MAGNITUDE, MSFP_LENGTH, MSFP_VECTOR } how; /* the length is that of two numbers */
+} msfp_extreme;
+/* Of number `index`. */
+msfp_extreme msfp_extreme_of(int index);
+/* Its value at a row, and its derivatives with respect to the one or two numbers that it is of; slopes may be NULL.
+ * across [3]: the displacement at the row. */
+double msfp_extreme_value(msfp_extreme e, const msfp_row *row, const double *across, double slopes[2]);
 /* Extremes of the first row. */
 void msfp_extremes_begin(msfp_run *run, const msfp_row *row);
 /* Extremes with those of the accepted step, after its rows are written. */
@@ -64,6 +75,14 @@ double msfp_next_output(const msfp_run *run);
 int msfp_write_row(msfp_run *run, const msfp_state *s);
 /* Rows of the accepted step. */
 int msfp_write_step(msfp_run *run);
+/* What a row inside a step keeps although its polynomial does not. */
+typedef struct {
+    double share[MSFP_NB], most[MSFP_NB]; /* Y, Z times `share` have the size `most` [-]; share 1: they are kept */
+    int row[MSFP_NB];                     /* of those it is interpolated from, that which has this size; -1: none */
+    unsigned char zero[MSFP_ROW_SIZE];    /* whether a number is set to zero */
+} msfp_row_limits;
+/* Set these in a row that is interpolated from `count` rows. */
+void msfp_limit_row(const msfp_run *run, const msfp_row *rows, int count, msfp_row *row, msfp_row_limits *limits);
 /* The row at a share of the last step, 0 to 1, but for its time. */
 void msfp_row_inside(msfp_run *run, double share, msfp_row *row);
 /* kind: enum msfp_event_kind; surface counted from 1, 0: none. */

@@ -79,15 +79,15 @@ int msfp_stage_solve(msfp_run *run, msfp_stages *s, int i)
 
 /* Where the solution is smooth, third-order weights integrate the work: they see the curvature of power over a long
  * step. Rates that ring are integrated correctly by the weights of the method alone; prescribed rates never ring. */
-static void refine_integrals(const msfp_stages *s, double h, int ringing, double *work)
+void msfp_refine_works(const msfp_tableau *method, const double *stages, size_t size, double h, int ringing, int width,
+                       double *work)
 {
-    const msfp_tableau *method = s->method;
-    for (int j = 0; j < method->stages && method->order <= 3.0; ++j)
-        if (ringing)
-            work[MSFP_WORK_INPUT] -= h * method->e[j] * s->stage[j].prescribed_power;
-        else
-            for (int e = 0; e < MSFP_WORKS; ++e) /* the energy stored in stuck friction always rings */
-                work[e] -= e == MSFP_WORK_FRICTION_STORED ? 0.0 : h * method->e[j] * s->stage[j].power[e];
+    for (int j = 0; j < method->stages && method->order <= 3.0; ++j, stages += size)
+        for (int i = 0; i < MSFP_WORKS * width; ++i)
+            if (!ringing && i / width != MSFP_WORK_FRICTION_STORED) /* which always rings where friction is stuck */
+                work[i] -= h * method->e[j] * MSFP_FROM(stages, power, width)[i];
+            else if (ringing && i / width == MSFP_WORK_INPUT)
+                work[i] -= h * method->e[j] * MSFP_FROM(stages, prescribed_power, width)[i - MSFP_WORK_INPUT * width];
 }
 
 /* Error of Y, Z outside the unit disc. Only the distance by which this step moves them outwards counts, with a weight
@@ -206,7 +206,8 @@ void msfp_stages_end(msfp_run *run, msfp_stages *s, double *error)
     double other = fmax(s->other, msfp_friction_jump_error(now, next));
     other = fmax(other, msfp_memory_error(run, &estimate, next, s->now.beta));
     *error = fmax(other, msfp_error_norm(run, &estimate, 0));
-    refine_integrals(s, h, *error > 1.0, next->work);
+    msfp_refine_works(method, (const double *)s->stage, sizeof *s->stage / sizeof(double), h, *error > 1.0, 1,
+                      next->work);
     MSFP_HOOK(run, stages_ended(run, s, *error > 1.0), (void)0);
     if (*error > 1.0) {
         filter(run, s, &estimate);

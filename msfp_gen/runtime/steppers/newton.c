@@ -25,18 +25,8 @@ static int closed_form(const msfp_stage *s)
 /* Coordinates and accelerations from the rates. */
 static void update_point(msfp_stage *s)
 {
-    if (closed_form(s)) { /* planar, without masses */
-        for (int k = 0; k < NB; ++k)
-            s->at.q[k][unknown[0]] = s->from.q[k][unknown[0]] + s->beta * s->at.v[k][unknown[0]];
-        return;
-    }
-    const double rate = s->inertia / s->beta;
-    for (int k = 0; k < NB; ++k) {
-        for (int d = 0; d < NQ; ++d)
-            s->at.q[k][d] = s->from.q[k][d] + s->beta * s->at.v[k][d];
-        for (int i = 0; i < ND; ++i)
-            s->at.a[k][unknown[i]] = rate * (s->at.v[k][unknown[i]] - s->from.v[k][unknown[i]]);
-    }
+    msfp_stage_formula(s->from.q[0], s->from.v[0], s->beta, s->inertia / s->beta, s->at.v[0], MSFP_COORDINATES,
+                       s->at.q[0], s->at.a[0]);
 }
 
 /* Newton's method solves for moments over N, which have the same root. The moment of a light slider is N times a lever

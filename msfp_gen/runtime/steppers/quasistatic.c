@@ -23,12 +23,14 @@ static void store_state(msfp_step_history *to, const msfp_point *at, const msfp_
 {
     double C[3];
     msfp_body_C_get(w->body[NB], C);
-    memcpy(to->load, at->load, sizeof to->load);
-    to->tilt = at->base[0][3 + ANGLE];
-    for (int i = 0; i < 3; ++i)
-        to->top[i] = C[i] - at->base[0][i];
+    for (int i = 0; i < 3; ++i) {
+        to->load[i] = at->load[i];
+        to->way[i] = C[i] - at->base[0][i];
+    }
+    to->load[3] = at->load[3 + ANGLE];
+    to->way[3] = at->base[0][3 + ANGLE];
     for (int k = 0; k < NB; ++k) {
-        to->tilt += at->q[k][ANGLE];
+        to->way[3] += at->q[k][ANGLE];
         to->normal[k] = w->contact[k][MSFP_CONTACT_N];
     }
 }
@@ -145,13 +147,14 @@ void msfp_quasistatic_restart(msfp_run *run)
     run->h *= 0.1;
 }
 
-/* Second divided difference of the last three values of power e, for the integral of the parabola through them. */
-static double second_difference(const msfp_run *run, double h, const double *power, int e)
+void msfp_parabola_works(const double *before, const double *now, const double *next, double last, double h, int width,
+                         double *work)
 {
-    const double last = run->step_history.h;
-    if (last <= 0.0)
-        return 0.0;
-    return ((power[e] - run->now.power[e]) / h - (run->now.power[e] - run->step_history.power[e]) / last) / (h + last);
+    for (int i = 0; i < MSFP_WORKS * width; ++i) {
+        const double bend = last > 0.0 ? ((next[i] - now[i]) / h - (now[i] - before[i]) / last) / (h + last) : 0.0;
+        if (i / width != MSFP_WORK_FRICTION_DISSIPATED && i / width != MSFP_WORK_FRICTION_STORED)
+            work[i] += 0.5 * h * (now[i] + next[i]) - bend * h * h * h / 6.0;
+    }
 }
 
 /* Work stored and dissipated by friction in the step, in closed form with the mean of mu N. */
@@ -174,9 +177,9 @@ static void friction_work(const msfp_run *run, double work[MSFP_WORKS])
 static double load_work(const msfp_run *run)
 {
     const msfp_step_history *from = &run->step_history, *to = &run->next_step_history;
-    double work = 0.5 * (from->load[3 + ANGLE] + to->load[3 + ANGLE]) * (to->tilt - from->tilt);
-    for (int i = 0; i < 3; ++i)
-        work += 0.5 * (from->load[i] + to->load[i]) * (to->top[i] - from->top[i]);
+    double work = 0.0;
+    for (int i = 0; i < 4; ++i)
+        work += 0.5 * (from->load[i] + to->load[i]) * (to->way[i] - from->way[i]);
     return work;
 }
 
@@ -189,10 +192,7 @@ static void count_work(msfp_run *run, const msfp_stage *s, double h)
     const msfp_input_parts parts =
         msfp_powers(&run->parameters, &s->at, &run->work, &next->mechanical, next->power);
     next->power[MSFP_WORK_INPUT] -= parts.load;
-    for (int e = 0; e < MSFP_WORKS; ++e)
-        if (e != MSFP_WORK_FRICTION_DISSIPATED && e != MSFP_WORK_FRICTION_STORED)
-            next->work[e] += 0.5 * h * (run->now.power[e] + next->power[e]) -
-                             second_difference(run, h, next->power, e) * h * h * h / 6.0;
+    msfp_parabola_works(run->step_history.power, run->now.power, next->power, run->step_history.h, h, 1, next->work);
     friction_work(run, next->work);
     next->work[MSFP_WORK_INPUT] += load_work(run);
 }

@@ -3,8 +3,6 @@
 #include <string.h>
 #include "steppers.h"
 
-#define NUMBERS(state, field) MSFP_NUMBERS(msfp_state, state, field)
-
 static const int unknown[MSFP_ND] = MSFP_FREE;
 
 void msfp_point_at(msfp_run *run, double t, msfp_point *at)
@@ -17,14 +15,6 @@ void msfp_point_at(msfp_run *run, double t, msfp_point *at)
 #if MSFP_TOP_ROTATION
     msfp_history_at(&run->support, t, 2, at->support);
 #endif
-}
-
-void msfp_hermite(const double *y0, const double *d0, const double *y1, const double *d1, double h, double s, int count,
-                  double *out)
-{
-    const double r = 1.0 - s, w0 = r * r * (1.0 + 2.0 * s), w1 = s * s * (3.0 - 2.0 * s), w = s * r * h;
-    for (int i = 0; i < count; ++i)
-        out[i] = w0 * y0[i] + w1 * y1[i] + w * (r * d0[i] - s * d1[i]);
 }
 
 msfp_weights msfp_weights_at(const msfp_run *run, double share)
@@ -42,45 +32,29 @@ msfp_weights msfp_weights_at(const msfp_run *run, double share)
     return w;
 }
 
-/* `count` numbers inside the step: on the polynomials through the interpolation nodes where the method has some, because
- * the rates at the ends of a stiff step ring while the values do not; else on the cubics through values and rates. value,
- * rate: where they begin in a state [bytes]. */
-static void inside(const msfp_run *run, const msfp_weights *w, double share, size_t value, size_t rate, int count,
-                   msfp_state *out)
-{
-    const char *ends[2] = { (const char *)&run->now, (const char *)&run->next };
-    const double *y0 = (const double *)(ends[0] + value), *y1 = (const double *)(ends[1] + value);
-    const double *numbers[MSFP_NODES + 2] = { y0, y1 };
-    double weights[MSFP_NODES + 2] = { w->of[0], w->of[w->count - 1] }, *to = (double *)((char *)out + value);
-    if (w->count == 2) {
-        msfp_hermite(y0, (const double *)(ends[0] + rate), y1, (const double *)(ends[1] + rate),
-                     run->next.t - run->now.t, share, count, to);
-        return;
-    }
-    for (int i = 2; i < w->count; ++i) {
-        numbers[i] = (const double *)((const char *)&run->node[i - 2].state + value);
-        weights[i] = w->of[i - 1];
-    }
-    msfp_weigh(weights, w->count, numbers, count, to);
-}
-
+/* On the polynomials through the interpolation nodes where the method has some, because the rates at the ends of a stiff
+ * step ring while the values do not; else on cubics. */
 void msfp_interpolate(const msfp_run *run, double share, msfp_state *out)
 {
-    const size_t q = offsetof(msfp_state, q), v = offsetof(msfp_state, v), a = offsetof(msfp_state, a);
     const msfp_weights w = msfp_weights_at(run, share);
+    const double *now = (const double *)&run->now, *next = (const double *)&run->next;
+    const double *numbers[MSFP_NODES + 2] = { MSFP_FROM(now, q, 1), MSFP_FROM(next, q, 1) };
+    double weights[MSFP_NODES + 2] = { w.of[0], w.of[w.count - 1] };
+    for (int i = 2; i < w.count; ++i) {
+        numbers[i] = MSFP_FROM((const double *)&run->node[i - 2].state, q, 1);
+        weights[i] = w.of[i - 1];
+    }
+    if (w.count == 2)
+        msfp_cubics(now, next, run->next.t - run->now.t, share, 1, (double *)out);
+    else
+        msfp_weigh(weights, w.count, numbers, MSFP_COORDINATES + MSFP_INTEGRATED, MSFP_FROM((double *)out, q, 1));
     out->t = run->now.t + share * (run->next.t - run->now.t);
-    inside(run, &w, share, q, v, MSFP_COORDINATES, out);
-    inside(run, &w, share, v, a, MSFP_INTEGRATED, out);
-    for (int k = 0; k < MSFP_INTEGRATED; ++k)
-        NUMBERS(out, a)[k] = (1.0 - share) * NUMBERS(&run->now, a)[k] + share * NUMBERS(&run->next, a)[k];
+    msfp_linear_rates(now, next, share, 1, (double *)out);
 }
 
 void msfp_add_rates(msfp_state *sum, const msfp_state *states, const double *weights, int count, double h)
 {
-    for (int j = 0; j < count; ++j) {
-        msfp_add(NUMBERS(sum, q), NUMBERS(&states[j], v), h * weights[j], MSFP_COORDINATES);
-        msfp_add(NUMBERS(sum, v), NUMBERS(&states[j], a), h * weights[j], MSFP_INTEGRATED);
-    }
+    msfp_sum_rates((double *)sum, (const double *)states, sizeof *states / sizeof(double), weights, count, h, 1);
 }
 
 void msfp_state_of(const msfp_run *run, const msfp_point *at, double f[NB][2], msfp_state *s)

@@ -46,9 +46,6 @@ void msfp_add_rates(msfp_state *sum, const msfp_state *states, const double *wei
 void msfp_state_of(const msfp_run *run, const msfp_point *at, double f[MSFP_NB][2], msfp_state *s);
 /* Powers and energies of the masses of that evaluation, into `s`. */
 void msfp_powers_of(const msfp_run *run, const msfp_point *at, msfp_state *s);
-/* The cubics through `count` values y and rates d at the ends of a step of length h, at its share s. */
-void msfp_hermite(const double *y0, const double *d0, const double *y1, const double *d1, double h, double s, int count,
-                  double *out);
 /* Sum of weights times `count` numbers of each of at least three items. */
 MSFP_INLINE void msfp_weigh(const double *weights, int items, const double *const *numbers, int count,
                             double *restrict sum)
@@ -61,6 +58,49 @@ MSFP_INLINE void msfp_weigh(const double *weights, int items, const double *cons
         for (int i = 0; i < count; ++i)
             sum[i] += weights[k] * numbers[k][i];
     /* NOLINTEND(clang-analyzer-core.*) */
+}
+/* What follows is written once for the numbers of states and for their columns, of which each number has `width`. */
+#define MSFP_FROM(numbers, field, width) ((numbers) + (width) * (offsetof(msfp_state, field) / sizeof(double)))
+/* As msfp_add_rates; size: numbers from one state to the next. */
+MSFP_INLINE void msfp_sum_rates(double *sum, const double *states, size_t size, const double *weights, int count,
+                                double h, int width)
+{
+    for (int j = 0; j < count; ++j, states += size) {
+        msfp_add(MSFP_FROM(sum, q, width), MSFP_FROM(states, v, width), h * weights[j], MSFP_COORDINATES * width);
+        msfp_add(MSFP_FROM(sum, v, width), MSFP_FROM(states, a, width), h * weights[j], MSFP_INTEGRATED * width);
+    }
+}
+/* The stage formula: q = q0 + beta v, a = rate (v - v0) with rate = 1/beta, or 0 without inertia. Of `count` numbers. */
+MSFP_INLINE void msfp_stage_formula(const double *restrict q0, const double *restrict v0, double beta, double rate,
+                                    const double *restrict v, int count, double *restrict q, double *restrict a)
+{
+    for (int i = 0; i < count; ++i) {
+        q[i] = q0[i] + beta * v[i];
+        a[i] = rate * (v[i] - v0[i]);
+    }
+}
+/* The cubics through `count` values y and rates d at the ends of a step of length h, at its share s. */
+MSFP_INLINE void msfp_hermite(const double *y0, const double *d0, const double *y1, const double *d1, double h,
+                              double s, int count, double *out)
+{
+    const double r = 1.0 - s, w0 = r * r * (1.0 + 2.0 * s), w1 = s * s * (3.0 - 2.0 * s), w = s * r * h;
+    for (int i = 0; i < count; ++i)
+        out[i] = w0 * y0[i] + w1 * y1[i] + w * (r * d0[i] - s * d1[i]);
+}
+/* What is integrated, on these cubics. */
+MSFP_INLINE void msfp_cubics(const double *now, const double *next, double h, double share, int width, double *out)
+{
+    msfp_hermite(MSFP_FROM(now, q, width), MSFP_FROM(now, v, width), MSFP_FROM(next, q, width),
+                 MSFP_FROM(next, v, width), h, share, MSFP_COORDINATES * width, MSFP_FROM(out, q, width));
+    msfp_hermite(MSFP_FROM(now, v, width), MSFP_FROM(now, a, width), MSFP_FROM(next, v, width),
+                 MSFP_FROM(next, a, width), h, share, MSFP_INTEGRATED * width, MSFP_FROM(out, v, width));
+}
+/* Its rates, linear in time. */
+MSFP_INLINE void msfp_linear_rates(const double *now, const double *next, double share, int width, double *out)
+{
+    for (int k = 0; k < MSFP_INTEGRATED * width; ++k)
+        MSFP_FROM(out, a, width)[k] =
+            (1.0 - share) * MSFP_FROM(now, a, width)[k] + share * MSFP_FROM(next, a, width)[k];
 }
 /* Largest error of a step over its tolerance [-]: of q, of Y, Z, of the foot, and if `rates` of their rates. */
 double msfp_error_norm(const msfp_run *run, const msfp_state *error, int rates);
@@ -98,6 +138,11 @@ int msfp_factorise_stage(msfp_run *run, msfp_stage *s, double *residual, double 
 
 /* ---- implicit.c: a step of an ESDIRK method, stage by stage ---- */
 
+/* What the weights of the error estimate add to the works of a step, or to their columns; size: numbers from one stage to
+ * the next; ringing: whether the rates ring. */
+void msfp_refine_works(const msfp_tableau *method, const double *stages, size_t size, double h, int ringing, int width,
+                       double *work);
+
 /* A step in progress: its stages, and the one that is being solved. */
 typedef struct {
     const msfp_tableau *method;
@@ -126,6 +171,10 @@ int msfp_is_quasistatic(const msfp_run *run);
 /* The step h, shortened so that no Y changes by more than 0.4 and no surface reverses, as far as can be
  * extrapolated. */
 double msfp_limit_step(const msfp_run *run, double h);
+/* The works of the step but those of friction += integrals of the parabolas through powers before the last step of length
+ * `last`, now and at the end of a step of length h; last 0: straight lines. Of `width` numbers each. */
+void msfp_parabola_works(const double *before, const double *now, const double *next, double last, double h, int width,
+                         double *work);
 /* After a quasi-static step to a rim contact or release, where rates and powers have a kink: the next step is short and
  * takes nothing from the steps before. */
 void msfp_quasistatic_restart(msfp_run *run);
@@ -145,8 +194,10 @@ struct msfp_hooks {
     void (*stage_solved)(msfp_run *run, int i, const msfp_stage *stage);
     /* States of its stages; ringing: whether its works are integrated as where rates ring. */
     void (*stages_ended)(msfp_run *run, const msfp_stages *s, int ringing);
-    /* Before an accepted step is recorded; after it is recorded; once its end is the present state. */
+    /* Before an accepted step is recorded; for each extreme that it has, at a share of the step; after it is recorded;
+     * once its end is the present state. */
     void (*before_step)(msfp_run *run);
+    void (*extreme_taken)(msfp_run *run, int index, double share);
     int (*step_recorded)(msfp_run *run, const double *before, const double *after);
     void (*step_accepted)(msfp_run *run);
     /* Where to evaluate row `index` of those at the ends of the last step and at its interpolation nodes, and then the
