@@ -52,7 +52,7 @@ SHORT: list[tuple[Layers, dict[str, Any]]] = [  # of the short campaign: models 
     ((2, 1, 0), {}),
     ((3, 1, 1), {}),
     ((5, 2, 2), {"bouc_wen": "isotropic"}),
-    ((5, 2, 2), {"friction": "velocity"}),
+    ((5, 2, 2), {"dimension": "planar", "friction": "velocity"}),
     ((5, 2, 2), {"dimension": "planar"}),
     ((5, 2, 2), {"dimension": "planar", "friction": "pvt"}),
 ]

@@ -10,18 +10,19 @@ import shutil
 import struct
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.replay import REPLAY, inputs
 
-from msfp_gen import Scene, build_model, cli, load_scene
+from msfp_gen import Effects, Scene, build_model, cli, load_scene
 from msfp_gen.common.errors import CompileError
 from msfp_gen.jit import library as platforms
 from msfp_gen.simulation.segment import start_run
 
-LAYOUT = ("5", "2", "2")
+LAYOUT = ("5", "2", "2", "--dimension", "planar")  # half of the compiling of a spatial model
 FLAGS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
 # Platform -> the first bytes of its shared library: format, architecture.
 MAGIC = {
@@ -106,7 +107,7 @@ def test_rows_under_wine_are_those_of_python_bit_by_bit(built: dict[str, Path], 
     if kind == "shared":
         shutil.copy(prefix / platform.shared, tmp_path)
     environment = {**os.environ, "WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all", "DISPLAY": ""}
-    scene = load_scene("fenz-test2")
+    scene = replace(load_scene("fenz-test2"), effects=Effects(dimension="planar"))
     done = subprocess.run(
         ["wine", path, "rows"], env=environment, input=inputs(scene), text=True, capture_output=True, timeout=300
     )
@@ -121,7 +122,7 @@ def test_rows_under_wine_are_those_of_python_bit_by_bit(built: dict[str, Path], 
 def test_rows_of_another_compiler_are_those_of_python_bit_by_bit(built: dict[str, Path], tmp_path: Path) -> None:
     """Compiled by zig for an older Linux, and by the compiler at hand for Python."""
     path = program(built["linux-x86_64"], "linux-x86_64", "lib/libmsfp.a", tmp_path, REPLAY)
-    scene = load_scene("fenz-test2")
+    scene = replace(load_scene("fenz-test2"), effects=Effects(dimension="planar"))
     done = subprocess.run([path, "rows"], input=inputs(scene), text=True, capture_output=True, check=True)
     compare(done.stdout, scene)
 

@@ -57,7 +57,7 @@ def a_scene(
 CASES: dict[str, Scene] = {
     "the report's model": a_scene((5, 2, 2), {}),
     "the report's method": a_scene((3, 1, 1), {}, method="dopri5"),
-    "planar": a_scene((2, 0, 1), {"dimension": "planar"}),
+    "planar": a_scene((2, 1, 0), {"dimension": "planar"}),
     "massless": a_scene((4, 2, 1), {"sliders": "massless", "bouc_wen": "isotropic"}),
     "patch": a_scene((3, 1, 1), {"spin": "patch"}),
     "uplift": a_scene((3, 1, 1), {"uplift": True}, shaken=0.008),
