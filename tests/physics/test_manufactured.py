@@ -100,6 +100,7 @@ def test_a_kink_leaves_order_two(name: str) -> None:
         assert found[-1]["angles"] < 2e-5
 
 
+@pytest.mark.slow
 def test_quasistatic_steps_are_exact_without_rates_and_of_order_two_with_dampers() -> None:
     plain, damped = quasistatic().values()
     exact = solve(plain)
