@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # What is published: sdist and wheel are built and checked, with the wheels that `make wheels` left in dist/prebuilt, and
 # each of the two is installed in an empty environment. There, outside the checkout, a preset runs, which builds its model
-# from the installed sources, and a study, with nothing installed beside the package. Built again in another folder, from
+# from the installed sources, and a study, with nothing installed beside the package. The second of the two finds the
+# models of the first, since its sources are the same. Built again in another folder, from
 # files with other times and permissions, they have the same bytes. What passed stands in dist, with its bill of materials.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -13,7 +14,7 @@ trap 'rm -rf "$folder"' EXIT
 SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct)}
 export SOURCE_DATE_EPOCH
 build() {
-    "$bin/python" -m build --outdir "$1" "$2" >"$folder/build.log" 2>&1 || { cat "$folder/build.log" >&2; exit 1; }
+    "$bin/python" -m build --installer uv --outdir "$1" "$2" >"$folder/build.log" 2>&1 || { cat "$folder/build.log" >&2; exit 1; }
 }
 build "$folder/dist" .
 (
@@ -33,14 +34,15 @@ for archive in "$folder"/dist/*; do
     "$bin/uv" venv -q --python "$bin/python" "$place/venv"
     "$bin/uv" pip install -q --python "$place/venv" "$archive"
     cd "$place"
-    MSFP_GEN_CACHE=$place/models venv/bin/msfp-gen run fenz-test1 --json >summary.json
+    MSFP_GEN_CACHE=$folder/models venv/bin/msfp-gen run fenz-test1 --json >summary.json
     venv/bin/msfp-gen study --example >study.toml
-    MSFP_GEN_CACHE=$place/models venv/bin/msfp-gen study study.toml -o study --shard 1/16 >study.log
+    MSFP_GEN_CACHE=$folder/models venv/bin/msfp-gen study study.toml -o study --shard 1/64 >study.log
     venv/bin/python - <<'PYTHON'
 import json, pathlib, msfp_gen
 from msfp_gen.studies import read_study
 assert "site-packages" in msfp_gen.__file__, f"not the installed package: {msfp_gen.__file__}"
-assert len(list(pathlib.Path("models").glob("msfp_5_2_2-*/manifest.json"))), "the model was not built here"
+models = list(pathlib.Path("../models").glob("msfp_5_2_2-*/manifest.json"))
+assert len(models) == 1, f"one model of the preset, built here for both archives: {models}"
 summary = json.loads(pathlib.Path("summary.json").read_text())
 assert summary["status"] == "ok", summary
 rows = read_study("study")

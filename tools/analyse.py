@@ -33,7 +33,7 @@ from quick import QUICK, parser
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "build" / "analysis"
 MODELS = {
-    "planar": ModelSpec(Layout.tfp(), Effects(dimension="planar")),
+    "planar": ModelSpec(Layout.tfp(), Effects(dimension="planar", sliders="massless")),
     "full": ModelSpec(
         Layout.tfp(), Effects(spin="patch", friction="pvt", uplift=True, top_rotation=True), gradients=True
     ),

@@ -49,14 +49,14 @@ enum wanted { ALL, OF_POSITIONS, OF_TOP_FORCE };
 /* Extremes with a row at a share of the last step. */
 static void take(msfp_run *run, const msfp_row *row, double share, enum wanted wanted)
 {
-    double across[3], *extreme = (double *)&run->extremes;
+    double displacement[3], *extreme = (double *)&run->extremes;
     (void)share; /* without gradients */
-    msfp_displacement_across(run, row, across);
+    msfp_displacement_across(run, row, displacement);
     for (const field *f = fields; f < fields + FIELDS; extreme += f++->count) {
         if ((wanted == OF_POSITIONS && !f->positions) || (wanted == OF_TOP_FORCE && f->of != MSFP_ROW_TOP_FORCE))
             continue;
         for (int k = 0; k < f->count; ++k) {
-            const double value = msfp_extreme_value(number_of(f, k), row, across, NULL);
+            const double value = msfp_extreme_value(number_of(f, k), row, displacement, NULL);
             if ((f->loaded && !(row->normal[k] > 0.0)) || !(f->least ? value < extreme[k] : value > extreme[k]))
                 continue;
             extreme[k] = value;
@@ -86,11 +86,12 @@ static double outward_rate(const msfp_run *run, const msfp_point *at, const msfp
 
 void msfp_extremes_begin(msfp_run *run, const msfp_row *row)
 {
+    static const double displacement[3];
     memset(&run->extremes, 0, sizeof run->extremes);
     for (int i = 0; i < MSFP_EXTREME_COUNT;
          ++i) /* magnitudes begin at zero, numbers with a sign at their first value */
         if (msfp_extreme_of(i).how == MSFP_NUMBER)
-            ((double *)&run->extremes)[i] = msfp_extreme_value(msfp_extreme_of(i), row, NULL, NULL);
+            ((double *)&run->extremes)[i] = msfp_extreme_value(msfp_extreme_of(i), row, displacement, NULL);
     take(run, row, 0.0, ALL);
     run->outward_rate = 0.0;
 }
