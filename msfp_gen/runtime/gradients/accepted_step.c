@@ -11,10 +11,7 @@ static const double slight_pull = 1e-3; /* of the normal force: a pull that does
 static int end_is_recorded(const msfp_run *run)
 {
     const struct msfp_gradients *g = run->gradients;
-    int taken = msfp_is_quasistatic(run) || run->row_count > g->row_count;
-    for (int i = 0; i < MSFP_EXTREME_COUNT; ++i)
-        taken |= g->extreme_share[i] != MSFP_NOT_TAKEN;
-    return taken;
+    return msfp_is_quasistatic(run) || run->row_count > g->row_count || g->extremes_taken;
 }
 
 /* Factored tangents of the stages of the step, at the evaluations that solved them. */

@@ -4,21 +4,25 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
+/* Column c of the displacement across the bearing. */
+MSFP_INLINE double across_columns(const msfp_parameter_batch *batch, const msfp_row_columns d, int axis, int c)
+{
+    return d[MSFP_ROW_BASE + axis][c] - d[MSFP_ROW_TOP + axis][c] - batch->start[axis][c];
+}
+
 /* Columns of extreme `index` at a row with the columns d. */
 static void take(const msfp_run *run, msfp_parameter_batch *batch, const msfp_row *row, const msfp_row_columns d,
                  int index)
 {
-    const msfp_extreme e = msfp_extreme_of(index);
     double across[3], slopes[2], *to = batch->extremes[index];
+    int of;
     msfp_displacement_across(run, row, across);
-    msfp_extreme_value(e, row, across, slopes);
+    const int count = msfp_extreme_slopes(index, row, across, &of, slopes);
     memset(to, 0, sizeof(msfp_columns));
-    for (int k = 0; k < (e.how == MSFP_LENGTH ? 2 : 1); ++k)
+    for (int i = of; i < of + count; ++i)
         for (int c = 0; c < C; ++c) {
-            const int axis = e.of + k - MSFP_ACROSS;
-            to[c] +=
-                slopes[k] * (axis < 0 ? d[e.of + k][c]
-                                      : d[MSFP_ROW_BASE + axis][c] - d[MSFP_ROW_TOP + axis][c] - batch->start[axis][c]);
+            const int axis = i - MSFP_ACROSS;
+            to[c] += slopes[i - of] * (axis < 0 ? d[i][c] : across_columns(batch, d, axis, c));
         }
 }
 
@@ -43,6 +47,8 @@ void msfp_extremes_of_step(msfp_run *run, msfp_parameter_batch *batch)
 {
     double share[MSFP_EXTREME_COUNT];
     msfp_row row;
+    if (!run->gradients->extremes_taken)
+        return;
     memcpy(share, run->gradients->extreme_share, sizeof share);
     for (int i = 0; i < MSFP_EXTREME_COUNT; ++i) {
         const double at = share[i];

@@ -115,11 +115,16 @@ static void stages_ended(msfp_run *run, const msfp_stages *s, int ringing)
 static void before_step(msfp_run *run)
 {
     run->gradients->recording.known = 0;
-    for (int i = 0; i < MSFP_EXTREME_COUNT; ++i)
+    for (int i = 0; i < MSFP_EXTREME_COUNT && run->gradients->extremes_taken; ++i)
         run->gradients->extreme_share[i] = MSFP_NOT_TAKEN;
+    run->gradients->extremes_taken = 0;
 }
 
-static void extreme_taken(msfp_run *run, int index, double share) { run->gradients->extreme_share[index] = share; }
+static void extreme_taken(msfp_run *run, int index, double share)
+{
+    run->gradients->extreme_share[index] = share;
+    run->gradients->extremes_taken = 1;
+}
 
 static void step_accepted(msfp_run *run)
 {
@@ -193,6 +198,7 @@ int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *in)
     g->batches = (in->count + C - 1) / C;
     g->energies = in->energies;
     g->event_time = -INFINITY;
+    g->extremes_taken = 1; /* the first step begins by forgetting all */
     g->steps = in->steps;
     g->step_count = in->step_count;
     g->batch = calloc(g->batches ? (size_t)g->batches : 1, sizeof *g->batch);

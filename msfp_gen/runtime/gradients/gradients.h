@@ -198,6 +198,7 @@ struct msfp_gradients {
     double *events; /* [event][parameter]: time, displacement, top force */
     size_t event_count, event_capacity;
     double extreme_share[MSFP_EXTREME_COUNT]; /* of the last step, where it took this extreme; else MSFP_NOT_TAKEN */
+    int extremes_taken;                       /* whether it took one */
     double event_time;                        /* of the last rim contact or release [s] */
     msfp_run own;           /* the run, while a step to an event is taken once more */
 };

@@ -118,22 +118,24 @@ static void limit_friction(const msfp_recording *rows, const msfp_row *row, cons
     }
 }
 
-/* Columns where msfp_limit_row has restored the bounds of a row. */
-static void restore_bounds(msfp_run *run, msfp_parameter_batch *batch, const msfp_row *row,
-                           const msfp_row_limits *limits, msfp_row_columns d)
+/* Columns of a row with the bounds of msfp_limit_row. */
+static void limit_row(msfp_run *run, msfp_parameter_batch *batch, int count, msfp_row *row, msfp_row_columns d)
 {
+    const msfp_recording *rows = &run->gradients->recording;
     msfp_columns gaps[NB][MSFP_GAP_SIZE];
     double sliding[NB][MSFP_GAP_SIZE];
-    msfp_gaps_columns(&run->parameters, &batch->parameters, row->q, (msfp_columns(*)[NQ])(d + MSFP_ROW_Q), sliding,
-                      gaps);
+    msfp_row_limits limits;
+    msfp_gaps_columns(&run->parameters, &batch->parameters, (const double(*)[NQ])row->q,
+                      (msfp_columns(*)[NQ])(d + MSFP_ROW_Q), sliding, gaps);
+    msfp_limit_row(rows->value, count, sliding, row, &limits);
+    limit_friction(rows, row, &limits, d);
     for (int j = 0; j < NB; ++j) {
         memcpy(d[MSFP_ROW_SLIDING + j], gaps[j][MSFP_GAP_S], sizeof *d);
         if (!MSFP_UPLIFT)
             memcpy(d[MSFP_ROW_GAP + j], gaps[j][MSFP_GAP_G], sizeof *d);
     }
-    for (int i = 0; i < MSFP_ROW_SIZE; ++i)
-        if (limits->zero[i])
-            memset(d[i], 0, sizeof *d);
+    for (int i = 0; i < limits.zero_count; ++i)
+        memset(d[limits.zero[i]], 0, sizeof *d);
 }
 
 MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batch *batch, double share, int moving,
@@ -146,7 +148,6 @@ MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batc
     const double *values[MSFP_NODES + 2], *columns[MSFP_NODES + 2];
     msfp_columns moved; /* of the share */
     msfp_row blended;
-    msfp_row_limits limits;
     for (int r = 0; r < w.count; ++r) {
         values[r] = (const double *)&rows->value[r];
         columns[r] = rows->d[r][0];
@@ -161,9 +162,7 @@ MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batc
         msfp_weigh(slopes, w.count, values, MSFP_ROW_SIZE, slope);
         msfp_add_scaled(d, slope, moved, 1.0, MSFP_ROW_SIZE);
     }
-    msfp_limit_row(run, rows->value, w.count, &blended, &limits);
-    limit_friction(rows, &blended, &limits, d);
-    restore_bounds(run, batch, &blended, &limits, d);
+    limit_row(run, batch, w.count, &blended, d);
 }
 
 void msfp_row_reached_columns(msfp_run *run, msfp_parameter_batch *batch)

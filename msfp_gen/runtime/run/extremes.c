@@ -6,41 +6,41 @@
 /* A field of msfp_extremes: of surfaces, or of a vector along E1, E2, E3 and in the horizontal plane. */
 typedef struct {
     int count, of, stride; /* how many numbers; where in a row the first is of, and the distance to the next */
-    int how;               /* as of msfp_extreme; MSFP_VECTOR: three magnitudes and a length */
-    int least;             /* whether the least counts, otherwise the largest */
-    int positions;         /* whether it follows from positions alone */
-    int loaded;            /* whether only surfaces count that carry a normal force */
+    enum { MSFP_NUMBER, MSFP_LENGTH, MSFP_VECTOR } how; /* the length is that of two numbers */
+    int least;                                          /* whether the least counts, otherwise the largest */
+    int positions;                                      /* whether it follows from positions alone */
+    int loaded;                                         /* whether only surfaces count that carry a normal force */
 } field;
 
 static const field fields[] = { MSFP_EXTREMES };
 enum { FIELDS = sizeof fields / sizeof *fields };
 
-MSFP_INLINE msfp_extreme number_of(const field *f, int k)
+static double length(const double *v) { return sqrt(v[0] * v[0] + v[1] * v[1]); }
+
+/* The numbers of a row that a field is of. */
+MSFP_INLINE const double *numbers_of(const field *f, const msfp_row *row, const double *across)
 {
-    if (f->how != MSFP_VECTOR)
-        return (msfp_extreme){ f->of + k * f->stride, f->how };
-    return k < 3 ? (msfp_extreme){ f->of + k, MSFP_MAGNITUDE } : (msfp_extreme){ f->of, MSFP_LENGTH };
+    return f->of < MSFP_ACROSS ? (const double *)row + f->of : across;
 }
 
-msfp_extreme msfp_extreme_of(int index)
+MSFP_INLINE double value_of(const field *f, const double *u, int k)
+{
+    if (f->how == MSFP_VECTOR)
+        return k < 3 ? fabs(u[k]) : length(u);
+    return f->how == MSFP_LENGTH ? length(u + k * f->stride) : u[k * f->stride];
+}
+
+int msfp_extreme_slopes(int index, const msfp_row *row, const double *across, int *of, double slopes[2])
 {
     const field *f = fields;
     while (index >= f->count)
         index -= f++->count;
-    return number_of(f, index);
-}
-
-static double length(const double *v) { return sqrt(v[0] * v[0] + v[1] * v[1]); }
-
-double msfp_extreme_value(msfp_extreme e, const msfp_row *row, const double *across, double slopes[2])
-{
-    const double *u = e.of < MSFP_ACROSS ? (const double *)row + e.of : across + e.of - MSFP_ACROSS;
-    const double value = e.how == MSFP_LENGTH ? length(u) : e.how == MSFP_MAGNITUDE ? fabs(u[0]) : u[0];
-    if (slopes) {
-        slopes[0] = e.how == MSFP_NUMBER ? 1.0 : value > 0.0 ? u[0] / value : 0.0;
-        slopes[1] = e.how == MSFP_LENGTH && value > 0.0 ? u[1] / value : 0.0;
-    }
-    return value;
+    const int radial = f->how == MSFP_VECTOR && index == 3, first = radial ? 0 : index * f->stride;
+    const double *u = numbers_of(f, row, across), value = value_of(f, u, index);
+    for (int i = 0; i < 2; ++i)
+        slopes[i] = f->how == MSFP_NUMBER ? 1.0 : value > 0.0 ? u[first + i] / value : 0.0;
+    *of = f->of + first;
+    return radial || f->how == MSFP_LENGTH ? 2 : 1;
 }
 
 /* What is taken of a row: all; what follows from positions alone; the force at the top. */
@@ -55,8 +55,9 @@ static void take(msfp_run *run, const msfp_row *row, double share, enum wanted w
     for (const field *f = fields; f < fields + FIELDS; extreme += f++->count) {
         if ((wanted == OF_POSITIONS && !f->positions) || (wanted == OF_TOP_FORCE && f->of != MSFP_ROW_TOP_FORCE))
             continue;
+        const double *u = numbers_of(f, row, displacement);
         for (int k = 0; k < f->count; ++k) {
-            const double value = msfp_extreme_value(number_of(f, k), row, displacement, NULL);
+            const double value = value_of(f, u, k);
             if ((f->loaded && !(row->normal[k] > 0.0)) || !(f->least ? value < extreme[k] : value > extreme[k]))
                 continue;
             extreme[k] = value;
@@ -86,12 +87,11 @@ static double outward_rate(const msfp_run *run, const msfp_point *at, const msfp
 
 void msfp_extremes_begin(msfp_run *run, const msfp_row *row)
 {
-    static const double displacement[3];
     memset(&run->extremes, 0, sizeof run->extremes);
-    for (int i = 0; i < MSFP_EXTREME_COUNT;
-         ++i) /* magnitudes begin at zero, numbers with a sign at their first value */
-        if (msfp_extreme_of(i).how == MSFP_NUMBER)
-            ((double *)&run->extremes)[i] = msfp_extreme_value(msfp_extreme_of(i), row, displacement, NULL);
+    double *extreme = (double *)&run->extremes;
+    for (const field *f = fields; f < fields + FIELDS; extreme += f++->count)
+        for (int k = 0; k < f->count && f->how == MSFP_NUMBER; ++k) /* those with a sign; magnitudes begin at zero */
+            extreme[k] = ((const double *)row)[f->of + k];
     take(run, row, 0.0, ALL);
     run->outward_rate = 0.0;
 }

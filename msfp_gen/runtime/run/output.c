@@ -64,9 +64,11 @@ static void blend(const msfp_row *rows, const msfp_weights *w, msfp_row *out)
 static void limit_friction(const msfp_row *rows, int count, msfp_row *row, msfp_row_limits *limits)
 {
     for (int j = 0; j < NB; ++j) {
-        double most = 1.0, size = msfp_hypot(row->f[j][0], row->f[j][1]);
+        const double size = msfp_hypot(row->f[j][0], row->f[j][1]);
+        double most = 1.0;
         limits->row[j] = -1;
-        for (int r = 0; r < count; ++r) {
+        limits->share[j] = 1.0;
+        for (int r = 0; r < count && size > 1.0; ++r) {
             /* `count` rows are set. NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage) */
             const double other = msfp_hypot(rows[r].f[j][0], rows[r].f[j][1]);
             if (other > most) {
@@ -75,9 +77,11 @@ static void limit_friction(const msfp_row *rows, int count, msfp_row *row, msfp_
             }
         }
         limits->most[j] = most;
-        limits->share[j] = size > most ? most / size : 1.0;
-        for (int d = 0; d < 2 && size > most; ++d)
-            row->f[j][d] *= most / size;
+        if (size <= most)
+            continue;
+        limits->share[j] = most / size;
+        for (int d = 0; d < 2; ++d)
+            row->f[j][d] *= limits->share[j];
     }
 }
 
@@ -86,27 +90,25 @@ static void clear(msfp_row *row, int first, int count, msfp_row_limits *limits)
 {
     for (int i = first; i < first + count; ++i) {
         ((double *)row)[i] = 0.0;
-        limits->zero[i] = 1;
+        limits->zero[limits->zero_count++] = i;
     }
 }
 
-void msfp_limit_row(const msfp_run *run, const msfp_row *rows, int count, msfp_row *row, msfp_row_limits *limits)
+void msfp_limit_row(const msfp_row *rows, int count, double sliding[NB][MSFP_GAP_SIZE], msfp_row *row,
+                    msfp_row_limits *limits)
 {
     static const int not_negative[] = { MSFP_ROW_KINETIC, MSFP_ROW_RIM_STORED, MSFP_ROW_SEAT_STORED };
-    const msfp_row *given = row;
-    double sliding[NB][MSFP_GAP_SIZE];
-    memset(limits->zero, 0, sizeof limits->zero);
+    limits->zero_count = 0;
     limit_friction(rows, count, row, limits);
     for (int i = 0; i < 3; ++i)
         if (((double *)row)[not_negative[i]] < 0.0)
             clear(row, not_negative[i], 1, limits);
-    msfp_gaps(&run->parameters, given->q, sliding); /* the sliding displacement has a kink at the centre */
     for (int j = 0; j < NB; ++j) {
         if (row->normal[j] < 0.0) {
             clear(row, MSFP_ROW_NORMAL + j, 1, limits);
             clear(row, MSFP_ROW_FORCE + 3 * j, 3, limits);
         }
-        row->sliding[j] = sliding[j][MSFP_GAP_S];
+        row->sliding[j] = sliding[j][MSFP_GAP_S]; /* it has a kink at the centre */
         row->gap[j] = MSFP_UPLIFT ? row->gap[j] : sliding[j][MSFP_GAP_G]; /* with uplift it follows the separation too */
         if (row->gap[j] > 0.0 || row->rim[j] < 0.0) /* a rim only pushes, and only in contact */
             clear(row, MSFP_ROW_RIM + j, 1, limits);
@@ -157,11 +159,13 @@ static void row_between(msfp_run *run, const msfp_row *rows, double share, msfp_
 {
     msfp_state s;
     msfp_row_limits limits;
+    double sliding[NB][MSFP_GAP_SIZE];
     msfp_interpolate(run, share, &s);
     if (run->node_count) {
         const msfp_weights w = msfp_weights_at(run, share);
         blend(rows, &w, row);
-        msfp_limit_row(run, rows, w.count, row, &limits);
+        msfp_gaps(&run->parameters, (const double(*)[NQ])row->q, sliding);
+        msfp_limit_row(rows, w.count, sliding, row, &limits);
     } else
         msfp_observe_state(run, &s, row);
     memcpy(row->work, s.work, sizeof row->work);

@@ -31,16 +31,9 @@ void msfp_monitor_begin(msfp_run *run);
 /* ---- extremes.c ---- */
 
 enum { MSFP_EXTREME_COUNT = sizeof(msfp_extremes) / sizeof(double), MSFP_ACROSS = MSFP_ROW_SIZE };
-/* How a number of msfp_extremes follows from a row. */
-typedef struct {
-    int of; /* the first number of the row that it is of; from MSFP_ACROSS on: displacement across the bearing */
-    enum { MSFP_NUMBER, MSFP_MAGNITUDE, MSFP_LENGTH, MSFP_VECTOR } how; /* the length is that of two numbers */
-} msfp_extreme;
-/* Of number `index`. */
-msfp_extreme msfp_extreme_of(int index);
-/* Its value at a row, and its derivatives with respect to the one or two numbers that it is of; slopes may be NULL.
- * across [3]: the displacement at the row. */
-double msfp_extreme_value(msfp_extreme e, const msfp_row *row, const double *across, double slopes[2]);
+/* Derivatives of number `index` of the extremes at a row: returns with respect to how many numbers, 1 or 2. across [3]:
+ * the displacement there. of: the first of these numbers; from MSFP_ACROSS on: displacement across the bearing. */
+int msfp_extreme_slopes(int index, const msfp_row *row, const double *across, int *of, double slopes[2]);
 /* Extremes of the first row. */
 void msfp_extremes_begin(msfp_run *run, const msfp_row *row);
 /* Extremes with those of the accepted step, after its rows are written. */
@@ -79,10 +72,11 @@ int msfp_write_step(msfp_run *run);
 typedef struct {
     double share[MSFP_NB], most[MSFP_NB]; /* Y, Z times `share` have the size `most` [-]; share 1: they are kept */
     int row[MSFP_NB];                     /* of those it is interpolated from, that which has this size; -1: none */
-    unsigned char zero[MSFP_ROW_SIZE];    /* whether a number is set to zero */
+    int zero_count, zero[MSFP_ROW_SIZE];  /* numbers that are set to zero */
 } msfp_row_limits;
-/* Set these in a row that is interpolated from `count` rows. */
-void msfp_limit_row(const msfp_run *run, const msfp_row *rows, int count, msfp_row *row, msfp_row_limits *limits);
+/* Set these in a row that is interpolated from `count` rows; sliding: as of msfp_gaps, at its angles. */
+void msfp_limit_row(const msfp_row *rows, int count, double sliding[MSFP_NB][MSFP_GAP_SIZE], msfp_row *row,
+                    msfp_row_limits *limits);
 /* The row at a share of the last step, 0 to 1, but for its time. */
 void msfp_row_inside(msfp_run *run, double share, msfp_row *row);
 /* kind: enum msfp_event_kind; surface counted from 1, 0: none. */

@@ -82,13 +82,14 @@ int msfp_stage_solve(msfp_run *run, msfp_stages *s, int i)
 void msfp_refine_works(const msfp_tableau *method, const double *stages, size_t size, double h, int ringing, int width,
                        double *work)
 {
-    for (int j = 0; j < method->stages && method->order <= 3.0; ++j, stages += size)
-        for (int i = 0; i < MSFP_WORKS * width; ++i)
-            if (!ringing && i / width != MSFP_WORK_FRICTION_STORED) /* which always rings where friction is stuck */
-                work[i] -= h * method->e[j] * MSFP_FROM(stages, power, width)[i];
-            else if (ringing && i / width == MSFP_WORK_INPUT)
-                work[i] -= h * method->e[j] * MSFP_FROM(stages, prescribed_power, width)[i - MSFP_WORK_INPUT * width];
+    for (int j = 0; j < method->stages && method->order <= 3.0; ++j, stages += size) {
+        const double *power = ringing ? MSFP_FROM(stages, prescribed_power, width) : MSFP_FROM(stages, power, width);
+        for (int e = 0; e < (ringing ? MSFP_WORK_INPUT + 1 : MSFP_WORKS); ++e)
+            if (e != MSFP_WORK_FRICTION_STORED) /* which always rings where friction is stuck */
+                msfp_add(work + e * width, power + e * width, -h * method->e[j], width);
+    }
 }
+MSFP_STATIC_ASSERT(MSFP_WORK_INPUT == 0, input_comes_first);
 
 /* Error of Y, Z outside the unit disc. Only the distance by which this step moves them outwards counts, with a weight
  * that grows with the distance already reached: a shorter step cannot reduce what was there before, and sliding does.
