@@ -36,11 +36,12 @@ int msfp_extreme_slopes(int index, const msfp_row *row, const double *across, in
     while (index >= f->count)
         index -= f++->count;
     const int radial = f->how == MSFP_VECTOR && index == 3, first = radial ? 0 : index * f->stride;
+    const int count = radial || f->how == MSFP_LENGTH ? 2 : 1;
     const double *u = numbers_of(f, row, across), value = value_of(f, u, index);
-    for (int i = 0; i < 2; ++i)
+    for (int i = 0; i < count; ++i)
         slopes[i] = f->how == MSFP_NUMBER ? 1.0 : value > 0.0 ? u[first + i] / value : 0.0;
     *of = f->of + first;
-    return radial || f->how == MSFP_LENGTH ? 2 : 1;
+    return count;
 }
 
 /* What is taken of a row: all; what follows from positions alone; the force at the top. */
