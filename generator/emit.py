@@ -219,7 +219,7 @@ def extreme_entries(spec: ModelSpec) -> Iterator[str]:
     fields_of = {field.name: field for field in contract.row(spec.effects)}
     for extreme in contract.extremes(spec.effects):
         vector = extreme.shape == (4,)
-        field = fields_of.get(extreme.of)
+        field = None if extreme.of == contract.ACROSS else fields_of[extreme.of]
         pair = field is not None and field.shape[1:] == (2,)
         count, stride = ("4", 1) if vector else ("MSFP_NB", 2 if pair else 1)
         how = "VECTOR" if vector else "LENGTH" if pair else "NUMBER"

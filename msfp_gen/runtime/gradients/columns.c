@@ -107,8 +107,8 @@ MSFP_INLINE void top_columns(const msfp_parameters *p, const msfp_parameter_colu
 MSFP_COLUMNWISE void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                                        const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
-    double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
     if (msfp_top_is_sprung(p)) {
+        double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
         msfp_foot_stage(p, at, stage);
         foot_stage_columns(p, dp, at, dat, dstage);
         msfp_foot_direction(p->top, w->body[NB], stage, w->foot, dp->top, d->body[NB], dstage, d->foot);

@@ -145,7 +145,7 @@ MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batc
     const msfp_recording *rows = &run->gradients->recording;
     const msfp_weights w = msfp_weights_at(run, share);
     const double h = run->next.t - run->now.t;
-    const double *values[MSFP_NODES + 2], *columns[MSFP_NODES + 2];
+    const double *values[MSFP_NODES + 2] = { NULL }, *columns[MSFP_NODES + 2] = { NULL };
     msfp_columns moved; /* of the share */
     msfp_row blended;
     for (int r = 0; r < w.count; ++r) {
