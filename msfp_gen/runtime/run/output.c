@@ -158,10 +158,10 @@ static void observe_nodes(msfp_run *run, msfp_row rows[MSFP_NODES + 2])
 static void row_between(msfp_run *run, const msfp_row *rows, double share, msfp_row *row)
 {
     msfp_state s;
-    msfp_row_limits limits;
-    double sliding[NB][MSFP_GAP_SIZE];
     msfp_interpolate(run, share, &s);
     if (run->node_count) {
+        msfp_row_limits limits;
+        double sliding[NB][MSFP_GAP_SIZE];
         const msfp_weights w = msfp_weights_at(run, share);
         blend(rows, &w, row);
         msfp_gaps(&run->parameters, (const double(*)[NQ])row->q, sliding);
