@@ -2,8 +2,8 @@
 # What is published: sdist and wheel are built and checked, with the wheels that `make wheels` left in dist/prebuilt, and
 # each of the two is installed in an empty environment. There, outside the checkout, a preset runs, which builds its model
 # from the installed sources, and a study, with nothing installed beside the package. The second of the two finds the
-# models of the first, since its sources are the same. Built again in another folder, from
-# files with other times and permissions, they have the same bytes. What passed stands in dist, with its bill of materials.
+# models of the first, since its sources are the same. Built again in another folder, from files with other times and
+# permissions, they have the same bytes. What passed stands in dist, with its bill of materials.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 root=$PWD
@@ -14,7 +14,8 @@ trap 'rm -rf "$folder"' EXIT
 SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct)}
 export SOURCE_DATE_EPOCH
 build() {
-    "$bin/python" -m build --installer uv --outdir "$1" "$2" >"$folder/build.log" 2>&1 || { cat "$folder/build.log" >&2; exit 1; }
+    "$bin/python" -m build --installer uv --outdir "$1" "$2" >"$folder/build.log" 2>&1 ||
+        { cat "$folder/build.log" >&2; exit 1; }
 }
 build "$folder/dist" .
 (

@@ -322,8 +322,7 @@ typedef struct {
 
 enum {
     MSFP_COORDINATES = MSFP_NB * MSFP_NQ,
-    MSFP_INTEGRATED = (offsetof(msfp_state, a) - offsetof(msfp_state, v)) / sizeof(double), /* numbers from v to work */
-    MSFP_INTEGRATED_MOTION = MSFP_INTEGRATED - MSFP_WORKS                                   /* from v to memory */
+    MSFP_INTEGRATED = (offsetof(msfp_state, a) - offsetof(msfp_state, v)) / sizeof(double) /* numbers from v to work */
 };
 
 /* An interpolation node inside the last step. */

@@ -1,5 +1,4 @@
 /* extreme_columns.c: derivatives of the extremes of a run. */
-#include <math.h>
 #include <string.h>
 #include "gradients.h"
 

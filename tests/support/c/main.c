@@ -46,9 +46,11 @@ static int evaluate(const msfp_parameters *p)
     at.base[2][0] = 0.5;
     at.load[2] = -LOAD;
     for (int k = 0; k < MSFP_NB; ++k) {
+        at.q[k][0] = 0.01 * (k + 1);
         at.q[k][1] = -0.02 * (k + 1);
         at.v[k][1] = 0.1;
         at.f[k][0] = 0.3;
+        at.f[k][1] = -0.2;
     }
     const int status = msfp_accelerations(p, &at, &work, &solution);
     if (status)

@@ -21,13 +21,13 @@ from msfp_gen.motions.piecewise import hermite5
 from msfp_gen.specification import contract
 
 LOAD = 112e3
-REPORT = Effects(dimension="planar")  # as main.c needs it: half of the compiling of a spatial model
+REPORT = Effects(bouc_wen="report")  # that of main.c
 MAIN = ROOT / "tests" / "support" / "c" / "main.c"
 
 STATE = {  # the same as in main.c
-    "q": [[0.0, -0.02 * k, 0.0] for k in range(1, 5)],
+    "q": [[0.01 * k, -0.02 * k, 0.0] for k in range(1, 5)],
     "v": [[0.0, 0.1, 0.0]] * 4,
-    "h": [[0.3, 0.0]] * 4,
+    "h": [[0.3, -0.2]] * 4,
 }
 
 # Only numpy and the generated module; `-I` keeps this checkout and the user's own packages off the path.
@@ -52,7 +52,7 @@ print(json.dumps(dict(status=status, acceleration=a.tolist(), friction_rate=rate
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     target = tmp_path_factory.mktemp("plain") / "model"
     try:
-        code = cli.main(["generate", "5", "2", "2", "--dimension", "planar", "--bouc-wen", "report", "-o", str(target)])
+        code = cli.main(["generate", "5", "2", "2", "--bouc-wen", "report", "-o", str(target)])
     except SystemExit as end:
         code = end.code
     assert not code
