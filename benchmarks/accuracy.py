@@ -19,10 +19,11 @@ from quick import docs_folder, parser, pick
 
 from msfp_gen import RunError, Scene
 from msfp_gen.common.output import replacing
-from msfp_gen.common.tables import markdown_table
+from msfp_gen.common.tables import markdown_table, write_rows
 from msfp_gen.studies.accuracy import model_errors, simulate_within, work_precision
 from msfp_gen.studies.accuracy.error_target import largest_error
-from msfp_gen.studies.accuracy.study import Point, Study, draw, machine, reference_text, without_stop, write_csv
+from msfp_gen.studies.accuracy.study import Point, Study, draw, machine, reference_text, without_stop
+from msfp_gen.studies.accuracy.study import rows as rows_of
 from msfp_gen.studies.accuracy.timed_run import errors, run_native
 
 HERE = Path(__file__).resolve().parent
@@ -170,7 +171,7 @@ def measured(case: Case, folder: Path, kind: str) -> tuple[str, Study]:
     )
     stem = f"accuracy-{'models-' if kind == 'model-error' else ''}{case.scene}"
     draw(study, folder / "figures" / f"{stem}.png")
-    write_csv(study, folder / "figures" / f"{stem}.csv")
+    write_rows(folder / "figures" / f"{stem}.csv", rows_of(study))
     say(f"{kind} of {case.scene}: {time.perf_counter() - begin:.0f} s")
     table = method_table(study) if kind == "work-precision" else model_table(study)
     notes = " ".join(f"{note[0].upper()}{note[1:]}." for note in study.notes if "not tried" not in note)

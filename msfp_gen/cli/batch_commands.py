@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -179,21 +180,12 @@ def work_precision(
 ) -> None:
     """Error against cost of every method and tolerance; a second method confirms the reference."""
     from msfp_gen.studies.accuracy.study import TOLERANCES
-    from msfp_gen.studies.accuracy.study import work_precision as study
+    from msfp_gen.studies.accuracy.study import work_precision as work
 
-    _report(
-        scene,
-        duration,
-        output,
-        as_json,
-        lambda chosen: study(
-            chosen,
-            methods=methods.split(",") if methods else None,
-            tolerances=TOLERANCES if tolerances is None else numbers(tolerances),
-            limit=limit,
-            say=note,
-        ),
-    )
+    settings = TOLERANCES if tolerances is None else numbers(tolerances)
+    chosen = methods.split(",") if methods else None
+    study = partial(work, methods=chosen, tolerances=settings, limit=limit, say=note)
+    _report(scene, duration, output, as_json, study)
 
 
 @bench.command(
@@ -210,17 +202,11 @@ def model_error(
     as_json: AsJson = False,
 ) -> None:
     """Error against cost of simplified models: planar, massless, without rims, linearised, OpenSees."""
-    from msfp_gen.studies.accuracy.models import TOLERANCES, model_errors
+    from msfp_gen.studies.accuracy.study import MODEL_TOLERANCES, model_errors
 
-    _report(
-        scene,
-        duration,
-        output,
-        as_json,
-        lambda chosen: model_errors(
-            chosen, tolerances=TOLERANCES if tolerances is None else numbers(tolerances), limit=limit, say=note
-        ),
-    )
+    settings = MODEL_TOLERANCES if tolerances is None else numbers(tolerances)
+    study = partial(model_errors, tolerances=settings, limit=limit, say=note)
+    _report(scene, duration, output, as_json, study)
 
 
 def _report(

@@ -9,10 +9,9 @@ effect selection, half to the method.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from math import pi
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final
 
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.tables import Table
@@ -22,7 +21,7 @@ from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.simulation.outcome import Progress
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.specification.layout import Auto, Effects
-from msfp_gen.studies.accuracy.timed_run import CUT_OFF, Attempt, Trial, dopri5_cost, errors, largest_error, run_native
+from msfp_gen.studies.accuracy.timed_run import CUT_OFF, Errors, Trial, dopri5_cost, errors, largest_error, run_native
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 AFTER_IMPACTS = ", and after impacts,"
 CANDIDATE_TOLERANCES = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21))  # 1e-2, 3e-3, 1e-3 ... 1e-10
 REFERENCE_OFFSET = 2  # places from a candidate tolerance to that of its reference run: a factor of ten
-REFERENCE_METHODS = {"implicit": "esdirk4", "esdirk4": "implicit"}  # other stages, order and dense output
 STEPS_PER_PERIOD = 40  # of a ringing slider, in a reference run that resolves it
 MOST_STEPS = 200_000  # of a reference run that resolves ringing: some seconds; beyond, ringing is stated as left out
 SAFETY = 1.5  # factor on the difference from the reference run, which has an error of its own
@@ -40,6 +38,7 @@ DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays a
 STAGNATION_RATIO = 0.7  # an estimate that falls by less than this over two candidates is not due to the tolerance
 BUDGET = 120.0  # [s] of wall time for the whole search
 METHOD: Final = "implicit"
+REFERENCE_METHOD = "esdirk4"  # other stages, order and dense output
 
 
 def effects_for(scene: Scene, error: float) -> tuple[Effects | Auto, str]:
@@ -64,6 +63,30 @@ def with_all_effects(scene: Scene) -> Scene:
     if isinstance(scene.effects, Effects):
         return scene
     return replace(scene, effects=all_effects(scene))
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One run of the search: its settings, its cost and its estimated error.
+
+    Attributes:
+        method: name of the method.
+        rtol: relative tolerance [-].
+        seconds: wall time [s]; measured for the chosen run, else its iterations times the time per iteration of that.
+        newton: Newton iterations.
+        estimate: largest of the RMS and peak errors of force and sliding, relative to peaks [-], times a factor of
+            safety; None if the run was compared with no other, or failed.
+        errors: differences from the reference run; None as for `estimate`.
+        status: how the run ended.
+    """
+
+    method: str
+    rtol: float
+    seconds: float
+    newton: int
+    estimate: float | None
+    errors: Errors | None
+    status: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +123,30 @@ class Within:
     @property
     def tables(self) -> list[Table]:
         """Tables for the console; with attempts and reasons if an explanation was requested."""
+        chosen = self.chosen
+        estimate = f"{share(chosen.estimate)}: {_parts(chosen)}"
         known = self.estimate is not None
-        tables = [within_table(self.target, self.chosen, self.next_step, self.seconds, self.left_out, known)]
-        return [*tables, attempt_table(self.attempts), reason_table(self.reasons)] if self.explained else tables
+        cost = (
+            f"{_seconds(chosen.seconds)}, {chosen.newton} Newton iterations; with the search {_seconds(self.seconds)}"
+        )
+        rows = [
+            ("requested error", share(self.target)),
+            ("estimated error of this run", estimate if known else f"not known; without what is left out {estimate}"),
+            *([("not in the estimate", self.left_out)] if self.left_out else []),
+            ("settings", f"{chosen.method}, rtol {chosen.rtol:g}"),
+            ("cost of this run", cost),
+            ("next tighter tolerance", _next(self.next_step, chosen)),
+        ]
+        tables = [Table("accuracy, relative to peaks", (), rows)]
+        if not self.explained:
+            return tables
+        columns = ("rtol", "outcome", "time", "Newton iterations", "estimated error")
+        tried = [
+            (f"{a.rtol:g}", a.status, _seconds(a.seconds), str(a.newton), share(a.estimate)) for a in self.attempts
+        ]
+        reasons = [("-", reason) for reason in self.reasons]
+        tables.append(Table("tolerances tried, each compared with a tighter one", columns, tried))
+        return [*tables, Table("reasons", (), reasons)]
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON."""
@@ -150,12 +194,12 @@ def simulate_within(
     for candidate in (scene, with_all_effects(scene)):
         build_model(candidate.bearing.layout, candidate.modelled)  # once, and not within the budget
     begin = time.perf_counter()
-    search = _Search(scene, METHOD, error, begin + budget)
+    search = _Search(scene, error, begin + budget)
     try:
         index = search.loosest()
     except _ModelErrorTooLargeError as failure:
         scene, effect_reasons = with_all_effects(scene), f"all effects: {effect_reasons}; but {failure}"
-        search = _Search(scene, METHOD, error, begin + budget)
+        search = _Search(scene, error, begin + budget)
         index = search.loosest()
     index = search.cheapest(index)
     result = simulate(replace(scene, solver=search.solver(index)), progress=progress)
@@ -193,8 +237,8 @@ class _Search:
     model all effects, so that the estimate includes the error of the selection.
     """
 
-    def __init__(self, scene: Scene, method: str, target: float, deadline: float) -> None:
-        self.scene, self.method, self.target, self.deadline = scene, method, target, deadline
+    def __init__(self, scene: Scene, target: float, deadline: float) -> None:
+        self.scene, self.target, self.deadline = scene, target, deadline
         self.trials: dict[int, Trial] = {}
         self.references: dict[int, Trial] = {}  # by the index of the run that each is compared with
         self.reference_scene = with_all_effects(scene)
@@ -204,13 +248,12 @@ class _Search:
 
     def solver(self, index: int) -> Solver:
         """Solver options at a candidate tolerance."""
-        tolerance = CANDIDATE_TOLERANCES[index]
-        return replace(self.scene.solver, method=cast("Any", self.method), rtol=tolerance, atol_angle=None)
+        return replace(self.scene.solver, method=METHOD, rtol=CANDIDATE_TOLERANCES[index], atol_angle=None)
 
     def trial(self, index: int) -> Trial:
         """The run at a candidate tolerance. Raises RunError when the budget is used up."""
         if index not in self.trials:
-            self.trials[index] = self._run(self.method, self.scene, CANDIDATE_TOLERANCES[index])
+            self.trials[index] = self._run(METHOD, self.scene, CANDIDATE_TOLERANCES[index])
         return self.trials[index]
 
     def reference(self, index: int) -> Trial:
@@ -222,7 +265,7 @@ class _Search:
             solver = replace(self.reference_scene.solver, max_step=min(steps), first_step=None)
             scene = replace(self.reference_scene, solver=solver)
             tolerance = CANDIDATE_TOLERANCES[index + REFERENCE_OFFSET]
-            self.references[index] = self._run(REFERENCE_METHODS[self.method], scene, tolerance)
+            self.references[index] = self._run(REFERENCE_METHOD, scene, tolerance)
         return self.references[index]
 
     def _run(self, method: str, scene: Scene, tolerance: float) -> Trial:
@@ -301,7 +344,7 @@ class _Search:
         """Why this method and this tolerance, in words."""
         looser = [k for k in sorted(self.trials) if k < index and self.attempt(k).estimate is not None]
         method = (
-            f"{self.method}: L-stable, so that stuck sliders, which ring at hundreds to thousands of hertz, do not "
+            f"{METHOD}: L-stable, so that stuck sliders, which ring at hundreds to thousands of hertz, do not "
             "limit its steps; that ringing is filtered, not resolved, and then esdirk4, of order 4, takes more "
             "Newton iterations for the same error (docs/accuracy.md)"
         )
@@ -323,7 +366,11 @@ class _Search:
         if not self.rings or self.resolves_ringing or pi * damping / self.period > DAMPED:
             return ""
         impact = any(event.kind in ("rim_contact", "landing") for event in result.events)
-        return ringing_left_out(1 / self.period, impact)
+        return (
+            f"the ringing of stuck sliders{AFTER_IMPACTS if impact else ''} at {1 / self.period:.0f} Hz and above, "
+            "which has no damping and is filtered: resolved on purpose it moved the force of other scenes by up to 1 % "
+            "(docs/accuracy.md); give contact_damping"
+        )
 
     def _target_missed(self) -> str:
         """Message that the target was not reached, with the best run so far."""
@@ -338,55 +385,6 @@ class _Search:
             f"an error of {self.target:g} was not reached{'' if failed else ' in the time given'}: {so_far}; "
             "give a larger error, a larger budget, or a tolerance (rtol) to run without an estimate"
         )
-
-
-def within_table(
-    target: float, chosen: Attempt, step: Attempt | None, seconds: float, left_out: str, known: bool
-) -> Table:
-    """Requested and estimated error, settings and cost, and the cost of the next tighter tolerance.
-
-    Args:
-        target: requested error [-].
-        chosen: the run.
-        step: the next tighter tolerance; None if it was not run.
-        seconds: wall time with the search [s].
-        left_out: what the estimate does not include.
-        known: whether what is left out is small enough for the estimate to be one of the true error.
-    """
-    estimate = f"{share(chosen.estimate)}: {_parts(chosen)}"
-    rows = [
-        ("requested error", share(target)),
-        ("estimated error of this run", estimate if known else f"not known; without what is left out {estimate}"),
-        *([("not in the estimate", left_out)] if left_out else []),
-        ("settings", f"{chosen.method}, rtol {chosen.rtol:g}"),
-        (
-            "cost of this run",
-            f"{_seconds(chosen.seconds)}, {chosen.newton} Newton iterations; with the search {_seconds(seconds)}",
-        ),
-        ("next tighter tolerance", _next(step, chosen)),
-    ]
-    return Table("accuracy, relative to peaks", (), rows)
-
-
-def ringing_left_out(frequency: float, impact: bool) -> str:
-    """What an estimate without the ringing of stuck sliders leaves out; frequency: of the slowest of them [Hz]."""
-    return (
-        f"the ringing of stuck sliders{AFTER_IMPACTS if impact else ''} at {frequency:.0f} Hz and above, which has no "
-        "damping and is filtered: resolved on purpose it moved the force of other scenes by up to 1 % "
-        "(docs/accuracy.md); give contact_damping"
-    )
-
-
-def attempt_table(attempts: Sequence[Attempt]) -> Table:
-    """Every run of the search."""
-    columns = ("rtol", "outcome", "time", "Newton iterations", "estimated error")
-    rows = [(f"{a.rtol:g}", a.status, _seconds(a.seconds), str(a.newton), share(a.estimate)) for a in attempts]
-    return Table("tolerances tried, each compared with a tighter one", columns, rows)
-
-
-def reason_table(reasons: Sequence[str]) -> Table:
-    """Why these settings were chosen."""
-    return Table("reasons", (), [("-", reason) for reason in reasons])
 
 
 def share(value: float | None) -> str:

@@ -1,10 +1,10 @@
-"""The methods of integration that are compared, as a table, and SciPy's integrators on the same equations."""
+"""Tables of the methods and simplified models that are compared, and SciPy's integrators on the same equations."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,8 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.model.model import build_model
+from msfp_gen.motions.motion import Motion
+from msfp_gen.studies.accuracy.series import run_opensees, run_series
 from msfp_gen.studies.accuracy.timed_run import (
     CUT_OFF,
     OK,
@@ -75,20 +77,8 @@ def run_library(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
     reached = float(times[len(force) - 1])
     if status == OK and len(force) < len(times):
         status, message = "failed", f"no acceleration at t = {reached:.6g} s"
-    return Trial(
-        name,
-        rtol,
-        status,
-        seconds,
-        reached,
-        scene.end,
-        work.newton,
-        work.evaluations,
-        work.steps,
-        force,
-        sliding,
-        message,
-    )
+    cost = work.newton, work.evaluations, work.steps
+    return Trial(name, rtol, status, seconds, reached, scene.end, *cost, force, sliding, message)
 
 
 def _initial_state(scene: Scene, ode: Ode) -> Array:
@@ -126,17 +116,8 @@ def _solver(kind: Any, scene: Scene, ode: Ode, work: Work, first: float, last: f
     tolerance[6 * ode.count :] = rtol
     steps = [s for s in (scene.solver.max_step, scene.motion.max_step) if s is not None]
     options: dict[str, Any] = {"jac": jac} if kind.__name__ in WITH_JACOBIAN else {}
-    solver = kind(
-        fun,
-        first,
-        y,
-        last,
-        rtol=rtol,
-        atol=tolerance,
-        max_step=min(steps, default=np.inf),
-        first_step=min(FIRST_STEP, 1e-3 * (last - first)),
-        **options,
-    )
+    options |= {"max_step": min(steps, default=np.inf), "first_step": min(FIRST_STEP, 1e-3 * (last - first))}
+    solver = kind(fun, first, y, last, rtol=rtol, atol=tolerance, **options)
     started.append(True)
     return solver
 
@@ -168,46 +149,53 @@ def _force_and_sliding(ode: Ode, times: Array, states: Array) -> tuple[Array, Ar
 
 @dataclass(frozen=True)
 class Method:
-    """A method of integration.
+    """A method of integration, or a simplified model by the default method.
 
     Attributes:
-        name: as in options and output.
+        name: as in options, tables and figures.
         family: methods of one family share their formulas or their code, so their agreement confirms little.
-        about: one line of description.
-        run: (scene, rtol, limit of wall time [s]) -> Trial; raises InputError if it cannot run the scene.
+        run: (scene, setting, limit of wall time [s]) -> Trial; raises InputError if it cannot run the scene.
+        stepped: whether it has no error control: its settings are numbers of steps, not tolerances.
     """
 
     name: str
     family: str
-    about: str
-    run: Callable[[Scene, float, float], Trial]
+    run: Callable[[Scene, Any, float], Trial]
+    stepped: bool = False
 
-    def attempt(self, scene: Scene, rtol: float, limit: float) -> Trial:
-        """Run `scene`; a scene that the method cannot run gives a trial with status "refused"."""
+    def attempt(self, scene: Scene, setting: float, limit: float) -> Trial:
+        """Run `scene`; a scene that it cannot run gives a trial with status "refused", an error one that failed.
+
+        Raises RunError where the user interrupts.
+        """
         try:
-            return self.run(scene, rtol, limit)
-        except InputError as error:
-            return refused_trial(self.name, rtol, scene, str(error))
+            return replace(self.run(scene, setting, limit), method=self.name)
+        except (InputError, RunError) as error:
+            if isinstance(error, RunError) and error.status == "interrupted":
+                raise
+            rtol = scene.end / setting if self.stepped else setting
+            trial = replace(refused_trial(self.name, rtol, scene, str(error)), stepped=self.stepped)
+            return trial if isinstance(error, InputError) else replace(trial, status=error.status or "failed")
 
 
-def _native(name: str, family: str, about: str) -> Method:
-    return Method(name, family, about, partial(run_native, name))
+def _native(name: str, family: str) -> Method:
+    return Method(name, family, partial(run_native, name))
 
 
-def _library(name: str, about: str) -> Method:
-    return Method(name, name, f"SciPy: {about}", partial(run_library, name))
+def _library(name: str) -> Method:
+    return Method(name, name, partial(run_library, name))
 
 
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
-        _native("implicit", "implicit", "the default: TR-BDF2, order 2, L-stable"),
-        _native("esdirk4", "implicit", "ESDIRK4(3), order 4, L-stable: the same condensed equations and Newton steps"),
-        _native("dopri5", "dopri5", "PEER 2017/07: Dormand-Prince 5(4), Newton on all 6(n-1) balances"),
-        _library("Radau", "Radau IIA, order 5, L-stable"),
-        _library("BDF", "backward differences, orders 1 to 5"),
-        _library("LSODA", "Adams and backward differences, switching"),
-        _library("DOP853", "Dormand-Prince 8(5,3), explicit"),
+        _native("implicit", "implicit"),  # the default: TR-BDF2, order 2, L-stable
+        _native("esdirk4", "implicit"),  # ESDIRK4(3), order 4, L-stable: the same condensed equations and Newton steps
+        _native("dopri5", "dopri5"),  # PEER 2017/07: Dormand-Prince 5(4), Newton on all 6(n-1) balances
+        _library("Radau"),  # SciPy's: Radau IIA, order 5, L-stable
+        _library("BDF"),  # backward differences, orders 1 to 5
+        _library("LSODA"),  # Adams and backward differences, switching
+        _library("DOP853"),  # Dormand-Prince 8(5,3), explicit
     )
 }
 
@@ -218,3 +206,68 @@ def methods_named(names: list[str] | None) -> list[Method]:
         if name not in METHODS:
             raise InputError(f"methods = {name!r}: give some of {', '.join(METHODS)}")
     return [METHODS[name] for name in names or METHODS]
+
+
+def _effects(name: str, **changes: Any) -> Method:
+    return Method(name, "implicit", partial(_with_effects, changes))
+
+
+def _stepped(name: str, run: Callable[[Scene, int], Trial]) -> Method:
+    return Method(name, name, lambda scene, steps, _: run(scene, steps), stepped=True)
+
+
+def _with_effects(changes: dict[str, Any], scene: Scene, rtol: float, limit: float) -> Trial:
+    """Run the scene by the default method with other effects."""
+    current = scene.modelled
+    if all(getattr(current, name) == value for name, value in changes.items()):
+        raise InputError(f"the scene itself has {', '.join(f'{name} = {value!r}' for name, value in changes.items())}")
+    effects = replace(current, **changes)
+    if effects.dimension == "planar" and scene.motion.plane() is None:
+        return _axis_by_axis(scene, effects, rtol, limit)
+    return run_native("implicit", replace(scene, effects=effects), rtol, limit)
+
+
+def _axis_by_axis(scene: Scene, effects: Any, rtol: float, limit: float) -> Trial:
+    """Run a motion in two directions by one planar model for each horizontal axis, uncoupled, and combine them."""
+    one, two = (
+        run_native(
+            "implicit",
+            replace(scene, effects=effects, motion=_along(scene.motion, axis), motion_table=None),
+            rtol,
+            limit,
+        )
+        for axis in (0, 1)
+    )
+    worse = max(one, two, key=lambda t: not t.finished)
+    rows = min(len(one.force), len(two.force))
+    return replace(
+        worse,
+        seconds=one.seconds + two.seconds,
+        newton=one.newton + two.newton,
+        evaluations=one.evaluations + two.evaluations,
+        steps=one.steps + two.steps,
+        reached=min(one.reached, two.reached),
+        force=np.column_stack([one.force[:rows, 0], two.force[:rows, 1]]),
+        sliding=np.hypot(one.sliding[:rows], two.sliding[:rows]),
+    )
+
+
+def _along(motion: Motion, axis: int) -> Motion:
+    """The motion with one horizontal channel only; vertical motion is kept."""
+    if np.any(motion.coefficients[:, 3:]):
+        raise InputError("motion: a base that rocks about both axes cannot be split by axis; use the spatial model")
+    coefficients = motion.coefficients.copy()
+    coefficients[:, 1 - axis] = 0.0
+    return replace(motion, coefficients=coefficients)
+
+
+# Simplified models.
+VARIANTS: tuple[Method, ...] = (
+    _effects("planar", dimension="planar"),  # one vertical plane; a motion in two directions is run axis by axis
+    _effects("massless", sliders="massless"),  # no inertia of the sliders
+    _effects("no rims", rims=False),  # sliders travel beyond their capacity
+    _effects("planar massless", dimension="planar", sliders="massless"),
+    _stepped("linearised", run_series),  # published closed form: springs, friction and gaps in series
+    _stepped("linearised, arms", partial(run_series, arms=True)),  # with friction at the radius of its surface
+    _stepped("OpenSees", run_opensees),  # element TripleFrictionPendulum
+)

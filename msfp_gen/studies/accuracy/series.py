@@ -146,20 +146,8 @@ def run_series(scene: Scene, steps: int, arms: bool = False) -> Trial:
     columns = np.column_stack([force.real, force.imag, sliding])
     rows = np.column_stack([np.interp(at, times, column) for column in columns.T])
     assert len(rows) == ROWS + 1
-    return Trial(
-        "linearised",
-        scene.end / steps,
-        OK,
-        seconds,
-        scene.end,
-        scene.end,
-        0,
-        0,
-        steps,
-        rows[:, :2],
-        rows[:, 2:],
-        stepped=True,
-    )
+    end, cost = scene.end, (0, 0, steps)
+    return Trial("linearised", end / steps, OK, seconds, end, end, *cost, rows[:, :2], rows[:, 2:], stepped=True)
 
 
 def _as_complex(vectors: Array) -> list[complex]:
@@ -198,7 +186,7 @@ def _run_mass(scene: Scene, series: Series, times: Array) -> tuple[Array, Array]
 
 
 BASE, TOP, ELEMENT = 1, 2, 1
-STIFF, TOLERANCE = 1e10, 1e-10
+STIFF = 1e10
 YIELD = 1e-4  # [m]: least yield displacement passed to the element, whose manual recommends 0.25 to 1 mm
 
 
@@ -228,21 +216,9 @@ def run_opensees(scene: Scene, steps: int) -> Trial:
     at = at[at <= times[reached] * (1 + 1e-12)]
     rows = np.column_stack([np.interp(at, times[: reached + 1], column) for column in force.T])
     status, message = (OK, "") if reached == steps else ("failed", f"analyze failed at t = {times[reached]:.4g} s")
-    return Trial(
-        "OpenSees",
-        scene.end / steps,
-        status,
-        seconds,
-        float(times[reached]),
-        scene.end,
-        0,
-        0,
-        reached,
-        rows,
-        np.zeros((len(rows), 0)),
-        message,
-        stepped=True,
-    )
+    last, cost, sliding = float(times[reached]), (0, 0, reached), np.zeros((len(rows), 0))
+    setting = scene.end / steps
+    return Trial("OpenSees", setting, status, seconds, last, scene.end, *cost, rows, sliding, message, stepped=True)
 
 
 def _links(scene: Scene) -> tuple[Link, Link, Link]:
@@ -281,26 +257,8 @@ def _define_model(ops: Any, scene: Scene, lower: Link, upper: Link, inner: Link)
     capacities = [link.limit * link.effective for link in (inner, lower, upper)]
     yielding = max(YIELD, min(link.yielding for link in (inner, lower, upper)))
     radii = [link.effective for link in (inner, lower, upper)]
-    ops.element(
-        "TripleFrictionPendulum",
-        ELEMENT,
-        BASE,
-        TOP,
-        1,
-        2,
-        3,
-        1,
-        2,
-        3,
-        4,
-        *radii,
-        *capacities,
-        load,
-        yielding,
-        STIFF,
-        0.1,
-        1e-5,
-    )
+    tags = (ELEMENT, BASE, TOP, 1, 2, 3, 1, 2, 3, 4)  # the element, its nodes, its laws of friction and materials
+    ops.element("TripleFrictionPendulum", *tags, *radii, *capacities, load, yielding, STIFF, 0.1, 1e-5)
     if isinstance(scene.top, MassTop):
         ops.mass(TOP, *(scene.top.mass,) * 3, 0.0, 0.0, 0.0)
 
@@ -310,7 +268,7 @@ def _integrate(ops: Any, scene: Scene, times: Array) -> tuple[int, Array]:
     ops.timeSeries("Linear", 1)
     ops.pattern("Plain", 1, 1)
     ops.load(TOP, 0.0, 0.0, -_load(scene), 0.0, 0.0, 0.0)
-    _settings(ops, "Transformation")
+    _settings(ops)
     ops.integrator("LoadControl", 0.1)
     ops.analysis("Static")
     ops.analyze(10)
@@ -340,7 +298,7 @@ def _static(ops: Any, scene: Scene, times: Array) -> None:
         ops.timeSeries("Path", tag, "-dt", float(times[1]), "-values", *_padded(motion[:, axis] - motion[0, axis]))
         ops.pattern("Plain", tag, tag)
         ops.sp(TOP, axis + 1, 1.0)
-    _settings(ops, "Transformation")
+    _settings(ops)
     ops.integrator("LoadControl", float(times[1]))
     ops.analysis("Static")
 
@@ -352,13 +310,13 @@ def _dynamic(ops: Any, scene: Scene, times: Array) -> None:
         tag = 10 + axis
         ops.timeSeries("Path", tag, "-dt", float(times[1]), "-values", *_padded(ground[:, axis]))
         ops.pattern("UniformExcitation", tag, axis + 1, "-accel", tag)
-    _settings(ops, "Transformation")
+    _settings(ops)
     ops.integrator("HHT", 0.67)
     ops.analysis("Transient")
 
 
-def _settings(ops: Any, constraints: str) -> None:
-    ops.constraints(constraints)
+def _settings(ops: Any) -> None:
+    ops.constraints("Transformation")
     ops.numberer("Plain")
     ops.system("FullGeneral")
     ops.test("NormUnbalance", 1e-3, 50, 0)

@@ -1,6 +1,7 @@
-"""Work-precision studies: several methods at several tolerances on one scene, against a confirmed reference; output.
+"""Error against cost on one scene, of methods at several tolerances and of simplified models, and its output.
 
-The output is tables, CSV, JSON, Markdown and a figure, with the machine that the times are of.
+All errors are measured against one confirmed reference. The output is tables, CSV, JSON, Markdown and a figure, with
+the machine that the times are of.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from msfp_gen.common.tables import Table, write_rows
 from msfp_gen.common.version import __version__
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.accuracy.error_target import with_all_effects
-from msfp_gen.studies.accuracy.methods import METHODS, Method, methods_named
+from msfp_gen.studies.accuracy.methods import METHODS, VARIANTS, Method, methods_named
 from msfp_gen.studies.accuracy.timed_run import (
     CUT_OFF,
     ERRORS,
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
 TOLERANCES = tuple(10.0**-k for k in range(2, 10))
+MODEL_TOLERANCES = TOLERANCES[:6]
+STEPS = (250, 1000, 4000)  # numbers of steps of models without error control
+CONFIRMING = ("Radau", (1e-4, 1e-5))  # method and tolerances that confirm the reference: the most robust of SciPy's
 LIMIT = 10.0  # [s] of wall time per run
 CONFIRMING_LIMIT = 6.0  # time limit of a rerun that may confirm the reference, over the limit of other runs
 CONFIRMING_RUNS = 2  # most of such reruns
@@ -46,6 +50,7 @@ TIGHTEST = 1e-11  # least tolerance of a reference run
 WRONG = 30.0  # a success is wrong if its RMS error exceeds this many tolerances,
 NEVER_WRONG, ALWAYS_WRONG = 1e-3, 0.1  # but never below the first error, and always above the second
 Say = Callable[[str], None]
+NAMES = tuple(field.name for field in fields(Errors))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +68,12 @@ class Point:
     trial: Trial
     errors: Errors | None
     wrong: bool
+
+    @property
+    def known_errors(self) -> dict[str, float | None]:
+        """Name -> error [-]; None where it is not defined."""
+        known = {} if self.errors is None else self.errors.as_dict()
+        return {name: known[name] if isfinite(known.get(name, nan)) else None for name in NAMES}
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +139,56 @@ def work_precision(
     return Study(scene, "work-precision", points, reference, (*notes, *reference_notes(reference)))
 
 
+def model_errors(
+    scene: Scene,
+    *,
+    tolerances: Sequence[float] = MODEL_TOLERANCES,
+    limit: float = LIMIT,
+    say: Say = lambda line: None,
+) -> Study:
+    """Error against cost of the scene as given and of simplified models, all against a reference of the former.
+
+    The error of a simplified model falls with its tolerance down to the error of the simplification. Arguments and
+    exceptions are those of `work_precision`.
+    """
+    check_settings(tolerances, limit)
+    scene = without_stop(scene)
+    full, _ = run_tolerances(METHODS["implicit"], scene, sorted(tolerances, reverse=True), limit, say)
+    name, confirming = CONFIRMING
+    others, _ = run_tolerances(METHODS[name], scene, confirming, limit, say)
+    extra = [*others, *tighter_runs(scene, full, limit, say), *confirming_reruns(scene, others, limit, say)]
+    reference = best_reference([*full, *extra], families())
+    points, notes = [point_of("as it stands", trial, reference) for trial in full], reference_notes(reference)
+    for variant in VARIANTS:
+        trials, left_out = _variant_trials(variant, scene, tolerances, limit, say)
+        # A simplified model may miss its tolerance by its model error, which is no wrong success.
+        points += [replace(point_of(variant.name, trial, reference), wrong=False) for trial in trials]
+        notes += left_out
+    return Study(scene, "model-error", tuple(points), reference, tuple(notes))
+
+
+def _variant_trials(
+    variant: Method, scene: Scene, tolerances: Sequence[float], limit: float, say: Say
+) -> tuple[list[Trial], list[str]]:
+    """The runs of one simplified model, and notes on settings that were not run."""
+    trials: list[Trial] = []
+    for setting in _step_counts(scene) if variant.stepped else sorted(tolerances, reverse=True):
+        trial = variant.attempt(scene, setting, limit)
+        if trial.status == REFUSED:
+            return [], [f"{variant.name}: left out; {trial.message}"]
+        trials.append(trial)
+        say(trial_line(trial))
+        if trial.status == CUT_OFF:
+            return trials, [f"{variant.name}: cut off, so tighter than {setting:g} was not tried"]
+    return trials, []
+
+
+def _step_counts(scene: Scene) -> list[int]:
+    """Numbers of steps: STEPS, or one, two and four per sampling interval of a long record."""
+    least = 1 if scene.motion.max_step is None else int(np.ceil(scene.end / scene.motion.max_step))
+    return [least, 2 * least, 4 * least] if least > STEPS[1] else list(STEPS)
+
+
 def check_settings(tolerances: Sequence[float], limit: float) -> None:
     """Raise InputError for a tolerance or a limit out of range."""
     for rtol in tolerances:
@@ -181,12 +242,12 @@ def trial_line(trial: Trial) -> str:
     return f"{trial.method} at {trial.setting}: {outcome}, {trial.seconds:.3g} s"
 
 
-def tighter_runs(scene: Scene, trials: Sequence[Trial], limit: float, say: Say, name: str = "implicit") -> list[Trial]:
-    """Runs of one method below the tightest tolerance that finished, until one does not finish: for a reference."""
-    done = [t.rtol for t in trials if t.method == name and t.finished]
+def tighter_runs(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
+    """Default runs below the tightest tolerance that finished, until one does not finish: for a reference."""
+    done = [t.rtol for t in trials if t.method == "implicit" and t.finished]
     rtol, tighter = min(done, default=1e-2) / 10, []
     while rtol > TIGHTEST:
-        trial = METHODS[name].attempt(scene, rtol, limit)
+        trial = METHODS["implicit"].attempt(scene, rtol, limit)
         say(f"reference: {trial_line(trial)}")
         if not trial.finished:
             break
@@ -241,18 +302,10 @@ def reference_notes(reference: Reference) -> list[str]:
     return []
 
 
-NAMES = tuple(field.name for field in fields(Errors))
+COLUMNS = ("method", "rtol", "status", "seconds", "expected_seconds", "newton", "evaluations", "steps", "reached")
 HEADS = (
-    "",
-    "tolerance",
-    "outcome",
-    "seconds",
-    "Newton iterations",
-    "force max",
-    "force RMS",
-    "sliding max",
-    "sliding RMS",
-)
+    "", "tolerance", "outcome", "seconds", "Newton iterations", "force max", "force RMS", "sliding max", "sliding RMS",
+)  # fmt: skip
 
 
 def machine() -> dict[str, str]:
@@ -303,27 +356,16 @@ def _commit() -> str:
 
 def rows(study: Study) -> list[dict[str, Any]]:
     """One dict of plain values per point; None where a value is not defined."""
-    return [_row(point) for point in study.points]
-
-
-def _row(point: Point) -> dict[str, Any]:
-    trial = point.trial
-    known = {} if point.errors is None else point.errors.as_dict()
-    return {
-        "series": point.series,
-        "method": trial.method,
-        "rtol": trial.rtol,
-        "status": trial.status,
-        "seconds": trial.seconds,
-        "expected_seconds": trial.expected_seconds,
-        "newton": trial.newton,
-        "evaluations": trial.evaluations,
-        "steps": trial.steps,
-        "reached": trial.reached,
-        **{name: known[name] if isfinite(known.get(name, nan)) else None for name in NAMES},
-        "wrong": point.wrong,
-        "message": trial.message,
-    }
+    return [
+        {
+            "series": point.series,
+            **{name: getattr(point.trial, name) for name in COLUMNS},
+            **point.known_errors,
+            "wrong": point.wrong,
+            "message": point.trial.message,
+        }
+        for point in study.points
+    ]
 
 
 def as_dict(study: Study) -> dict[str, Any]:
@@ -350,17 +392,14 @@ def tables(study: Study) -> list[Table]:
 
 
 def _points(study: Study) -> Table:
-    title = f"{study.kind} of {study.scene.name or 'unnamed scene'}"
-    return Table(title, HEADS, [_cells(point) for point in study.points])
-
-
-def _cells(point: Point) -> tuple[str, ...]:
-    trial = point.trial
-    expected = f"{trial.seconds:.3g}" if trial.status != CUT_OFF else f"(about {trial.expected_seconds:.2g})"
-    known = {} if point.errors is None else point.errors.as_dict()
-    shown = [f"{known[name]:.1e}" if isfinite(known.get(name, nan)) else "-" for name in ERRORS]
-    outcome = "WRONG SUCCESS" if point.wrong else trial.status
-    return point.series, trial.setting, outcome, expected, str(trial.newton), *shown
+    cells = []
+    for point in study.points:
+        trial, known = point.trial, point.known_errors
+        expected = f"{trial.seconds:.3g}" if trial.status != CUT_OFF else f"(about {trial.expected_seconds:.2g})"
+        shown = ["-" if (error := known[name]) is None else f"{error:.1e}" for name in ERRORS]
+        outcome = "WRONG SUCCESS" if point.wrong else trial.status
+        cells.append((point.series, trial.setting, outcome, expected, str(trial.newton), *shown))
+    return Table(f"{study.kind} of {study.scene.name or 'unnamed scene'}", HEADS, cells)
 
 
 def reference_text(study: Study) -> str:
@@ -386,22 +425,19 @@ def figure_table(study: Study) -> dict[str, dict[str, list[float]]]:
     out: dict[str, dict[str, list[float]]] = {}
     for series in study.series:
         points = [p for p in study.of(series) if p.trial.status != REFUSED]
-        if points:
-            out[series] = _columns(points)
+        if not points:
+            continue
+        columns = {"seconds": [p.trial.expected_seconds for p in points]}
+        share = [max(p.trial.reached / p.trial.end, 1e-9) if p.trial.status == CUT_OFF else 1.0 for p in points]
+        if any(p.trial.newton for p in points):
+            columns["newton"] = [p.trial.newton / part for p, part in zip(points, share, strict=True)]
+        for name in ERRORS:
+            columns[name] = [nan if p.errors is None else getattr(p.errors, name) for p in points]
+        columns["cut"] = [float(p.trial.status == CUT_OFF) for p in points]
+        columns["failed"] = [float(not p.trial.finished and p.trial.status != CUT_OFF) for p in points]
+        columns["wrong"] = [float(p.wrong) for p in points]
+        out[series] = columns
     return out
-
-
-def _columns(points: list[Point]) -> dict[str, list[float]]:
-    columns: dict[str, list[float]] = {"seconds": [p.trial.expected_seconds for p in points]}
-    share = [max(p.trial.reached / p.trial.end, 1e-9) if p.trial.status == CUT_OFF else 1.0 for p in points]
-    if any(p.trial.newton for p in points):
-        columns["newton"] = [p.trial.newton / part for p, part in zip(points, share, strict=True)]
-    for name in ERRORS:
-        columns[name] = [float("nan") if p.errors is None else getattr(p.errors, name) for p in points]
-    columns["cut"] = [float(p.trial.status == CUT_OFF) for p in points]
-    columns["failed"] = [float(not p.trial.finished and p.trial.status != CUT_OFF) for p in points]
-    columns["wrong"] = [float(p.wrong) for p in points]
-    return columns
 
 
 def draw(study: Study, path: str | Path) -> None:
@@ -420,17 +456,10 @@ def write(study: Study, folder: Path) -> list[Path]:
     Raises InputError if the folder cannot be made or written to.
     """
     make_folder(folder, "--output")
-    base = folder / study.kind
-    written = [write_csv(study, base.with_suffix(".csv"))]
-    for suffix, text in ((".json", json.dumps(as_dict(study), indent=2, allow_nan=False)), (".md", markdown(study))):
-        write_bytes(base.with_suffix(suffix), [text.encode()])
-        written.append(base.with_suffix(suffix))
-    for suffix in (".svg", ".png"):
-        draw(study, base.with_suffix(suffix))
-        written.append(base.with_suffix(suffix))
-    return written
-
-
-def write_csv(study: Study, path: Path) -> Path:
-    """Write the rows as CSV; the file appears only when complete."""
-    return write_rows(path, rows(study))
+    paths = {suffix: folder / f"{study.kind}.{suffix}" for suffix in ("csv", "json", "md", "svg", "png")}
+    write_rows(paths["csv"], rows(study))
+    write_bytes(paths["json"], [json.dumps(as_dict(study), indent=2, allow_nan=False).encode()])
+    write_bytes(paths["md"], [markdown(study).encode()])
+    draw(study, paths["svg"])
+    draw(study, paths["png"])
+    return list(paths.values())

@@ -11,13 +11,11 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
-from msfp_gen.results.history import Counters
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.batch import OUT_OF_TIME, run_to_end
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
-    from msfp_gen.simulation.result import Result
 
 ERRORS = {
     "force_max": "top force, maximum",
@@ -112,8 +110,7 @@ def _peaks(trial: Trial) -> tuple[float, float]:
 
 
 def _rms(values: Array) -> Array:
-    out: Array = np.sqrt(np.mean(np.square(values), axis=0))
-    return out
+    return np.asarray(np.sqrt(np.mean(np.square(values), axis=0)))
 
 
 def best_reference(trials: Iterable[Trial], families: dict[str, str]) -> Reference:
@@ -138,16 +135,10 @@ def best_reference(trials: Iterable[Trial], families: dict[str, str]) -> Referen
     candidates = independent or pairs or [(finished[0], second) for second in finished[1:2]]
     if not candidates:
         return Reference(finished[0], None, None, independent=False)
-    floor, first, second = min(((_difference(*pair), *pair) for pair in candidates), key=lambda item: item[0].worst_rms)
+    known = ((errors(second, first), first, second) for first, second in candidates)
+    compared = [(floor, first, second) for floor, first, second in known if floor is not None]
+    floor, first, second = min(compared, key=lambda pair: pair[0].worst_rms)  # finished runs have rows
     return Reference(first, second, floor, independent=bool(independent))
-
-
-def _difference(first: Trial, second: Trial) -> Errors:
-    """Errors of `second` against `first`, both finished."""
-    differences = errors(second, first)
-    if differences is None:
-        raise RunError("a finished run has no rows", status="rows")
-    return differences
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,33 +218,22 @@ def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int 
     """
     solver = replace(scene.solver, method=cast("Any", name), rtol=rtol, atol_angle=None)
     compared = replace(scene, solver=solver, output_step=scene.end / ROWS)
-    result, status, message = _run_limited(compared, limit)
-    if result is None:
-        return replace(refused_trial(name, rtol, scene, message), status=status)
+    try:
+        result = run_to_end(compared, seconds=limit)
+        status, message = OK if result.succeeded else result.status, result.message
+    except RunError as error:
+        result, status, message = None, error.status or "failed", str(error)
+        if status == OUT_OF_TIME:
+            result, status, message = error.result, CUT_OFF, f"cut off after {limit:g} s"
+        if result is None:
+            return replace(refused_trial(name, rtol, scene, message), status=status)
+    if status == "interrupted":  # by the user
+        raise RunError(message, status=status, result=result)
     counters = result.counters
     if repeats and status == OK and counters.wall_time < QUICK:
         plain = replace(scene, solver=solver, output_step=None)
         seconds = min(simulate(plain).counters.wall_time for _ in range(repeats))
         counters = replace(counters, wall_time=seconds)
-    return _trial(name, rtol, scene, result, counters, status, message)
-
-
-def _run_limited(scene: Scene, limit: float) -> tuple[Result | None, str, str]:
-    """The result as far as it was computed, its status, and the message of a failure."""
-    try:
-        result = run_to_end(scene, seconds=limit)
-    except RunError as error:
-        if error.status == OUT_OF_TIME:
-            return error.result, CUT_OFF, f"cut off after {limit:g} s"  # type: ignore[return-value]
-        return None, error.status or "failed", str(error)
-    if result.status == "interrupted":  # by the user
-        raise RunError(result.message, status=result.status, result=result)
-    return result, OK if result.succeeded else result.status, result.message
-
-
-def _trial(
-    name: str, rtol: float, scene: Scene, result: Result, counters: Counters, status: str, message: str
-) -> Trial:
     history = result.history
     return Trial(
         method=name,
@@ -285,27 +265,3 @@ def dopri5_cost(scene: Scene) -> tuple[str, ...]:
         f"dopri5, the method of PEER 2017/07, resolves the ringing: about {burst.expected_seconds:.2g} s at its rate "
         f"over the first {burst.reached:.2g} s of motion",
     )
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """One run of the search: its settings, its cost and its estimated error.
-
-    Attributes:
-        method: name of the method.
-        rtol: relative tolerance [-].
-        seconds: wall time [s]; measured for the chosen run, else its iterations times the time per iteration of that.
-        newton: Newton iterations.
-        estimate: largest of the RMS and peak errors of force and sliding, relative to peaks [-], times a factor of
-            safety; None if the run was compared with no other, or failed.
-        errors: differences from the reference run; None as for `estimate`.
-        status: how the run ended.
-    """
-
-    method: str
-    rtol: float
-    seconds: float
-    newton: int
-    estimate: float | None
-    errors: Errors | None
-    status: str

@@ -14,11 +14,10 @@ from support.peers import opensees_runs
 
 from msfp_gen import InputError, Motion, RunError, Top, load_scene, presets, simulate
 from msfp_gen.cli import main
-from msfp_gen.studies.accuracy import model_errors, models, series
-from msfp_gen.studies.accuracy.methods import METHODS
-from msfp_gen.studies.accuracy.models import VARIANTS
+from msfp_gen.studies.accuracy import methods, model_errors, series
+from msfp_gen.studies.accuracy.methods import METHODS, VARIANTS
 from msfp_gen.studies.accuracy.series import Series, run_series
-from msfp_gen.studies.accuracy.study import markdown, without_stop
+from msfp_gen.studies.accuracy.study import _variant_trials, markdown, without_stop
 from msfp_gen.studies.accuracy.timed_run import OK, ROWS, errors, run_native
 
 NAMED = {variant.name: variant for variant in VARIANTS}
@@ -142,8 +141,24 @@ def test_what_does_not_apply_is_left_out_and_said(monkeypatch):
         ("OpenSees", {}, "pip install 'msfp-gen[opensees]'"),
     ):
         scene = scene_of("fenz-test2", changes, duration=1.0)
-        trials, notes = models._variant_trials(NAMED[name], scene, [1e-2], 5.0, quiet)
+        trials, notes = _variant_trials(NAMED[name], scene, [1e-2], 5.0, quiet)
         assert not trials and why in notes[0]
+
+
+def test_an_interrupt_ends_the_study_and_a_failure_does_not():
+    """A model that finds no force is a failed run; Ctrl-C is for all of them."""
+    for status in ("newton", "interrupted"):
+
+        def fails(*_, status=status):
+            raise RunError("no force", status=status)
+
+        method = replace(NAMED["linearised"], run=fails)
+        if status == "interrupted":
+            with pytest.raises(RunError):
+                _variant_trials(method, short(), [1e-2], 5.0, quiet)
+        else:
+            trials, notes = _variant_trials(method, short(), [1e-2], 5.0, quiet)
+            assert [trial.status for trial in trials] == ["newton"] * 3 and not notes
 
 
 def test_a_motion_in_two_directions_is_run_axis_by_axis():
@@ -152,7 +167,7 @@ def test_a_motion_in_two_directions_is_run_axis_by_axis():
     full = run_native("implicit", scene, 1e-3, 20.0)
     assert found.status == OK and found.newton > full.newton and len(found.force) == ROWS + 1
     assert errors(found, full).force_rms > 0.05  # friction does not act axis by axis
-    one = replace(scene, effects=replace(scene.effects, dimension="planar"), motion=models._along(scene.motion, 0))
+    one = replace(scene, effects=replace(scene.effects, dimension="planar"), motion=methods._along(scene.motion, 0))
     alone = simulate(replace(one, motion_table=None, output_step=12.0 / ROWS, solver=replace(scene.solver, rtol=1e-3)))
     assert found.force[:, 0] == pytest.approx(alone.history.top_force[: ROWS + 1, 0], abs=1.0)
 
@@ -161,7 +176,7 @@ def test_a_rocking_base_has_no_planar_parts():
     pieces = np.zeros((1, 6, 6))
     pieces[0, :5, 3] = 1e-3
     with pytest.raises(InputError, match="rocks about both axes"):
-        models._along(Motion(np.array([0.0, 1.0]), pieces), 0)
+        methods._along(Motion(np.array([0.0, 1.0]), pieces), 0)
 
 
 class Ops(ModuleType):
