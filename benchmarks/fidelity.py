@@ -24,10 +24,8 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.scene import Scene
 from msfp_gen.studies import estimate
 from msfp_gen.studies.batch import run_to_end
-from msfp_gen.studies.estimation.crossing import crossings
-from msfp_gen.studies.estimation.estimate import Estimate, Question, estimated, fragility_of
-from msfp_gen.studies.estimation.figure import estimate_table
-from msfp_gen.studies.estimation.source import StudySource
+from msfp_gen.studies.estimation.estimate import Estimate, Question, estimate_table, estimated, fragility_of
+from msfp_gen.studies.estimation.source import StudySource, crossings
 from msfp_gen.studies.pool import pool_from
 from msfp_gen.studies.study.loader import example_text, load_study
 

@@ -147,8 +147,7 @@ def _estimate(
     definition: Study, output: Path, question: dict[str, Any], engine: dict[str, Any], plot: Path | None, as_json: bool
 ) -> None:
     """Estimate a statistic of a study and print it, in ten lines."""
-    from msfp_gen.studies import estimate
-    from msfp_gen.studies.estimation.figure import estimate_table, plot_estimate
+    from msfp_gen.studies.estimation.estimate import estimate, estimate_table, plot_estimate
 
     _check(plot, None)
     try:

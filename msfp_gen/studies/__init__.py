@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from msfp_gen.studies.assessment.sensitivity import tornado as tornado
     from msfp_gen.studies.estimation.estimate import Estimate as Estimate
     from msfp_gen.studies.estimation.estimate import estimate as estimate
-    from msfp_gen.studies.estimation.figure import plot_estimate as plot_estimate
+    from msfp_gen.studies.estimation.estimate import plot_estimate as plot_estimate
     from msfp_gen.studies.study.chunks import Status as Status
     from msfp_gen.studies.study.chunks import study_status as study_status
     from msfp_gen.studies.study.loader import load_study as load_study
@@ -33,7 +33,7 @@ _MODULES = {
     "Goals": "assessment.pareto",
     "Estimate": "estimation.estimate",
     "estimate": "estimation.estimate",
-    "plot_estimate": "estimation.figure",
+    "plot_estimate": "estimation.estimate",
     "fragility": "assessment.fragility",
     "ida": "assessment.ida",
     "read_study": "assessment.rows",

@@ -1,30 +1,38 @@
-"""`estimate`: a mean, variance, probability, quantile or fragility of a study from cheap and exact runs together."""
+"""`estimate`: a mean, variance, probability, quantile or fragility of a study from cheap and exact runs together.
+
+An estimate for a terminal, and its picture: width of the interval over time, plain Monte Carlo beside it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from shutil import rmtree
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Choice, Quantity, check_fields, to_si
-from msfp_gen.studies.estimation.allocation import EXACT, best_chain, factor_for, optimal_runs
-from msfp_gen.studies.estimation.crossing import crossings
+from msfp_gen.common.tables import Table
+from msfp_gen.figures.style import COLOURS, FAINT, INK, headline, page
+from msfp_gen.studies.assessment.rows import labelled
 from msfp_gen.studies.estimation.estimators import (
-    Flags,
+    EXACT,
     Indices,
     Moment,
     Runs,
     bent,
+    best_chain,
     exceedance,
     exceeding,
+    factor_for,
     feature,
+    optimal_runs,
     predictions,
     quantile_of,
     quantile_of_t,
@@ -32,10 +40,13 @@ from msfp_gen.studies.estimation.estimators import (
     uncertainty,
     variance_of,
 )
-from msfp_gen.studies.estimation.source import Source, StudySource
+from msfp_gen.studies.estimation.source import Searches, Source, StudySource
 from msfp_gen.studies.pool import pool_from
 from msfp_gen.studies.study.definition import Study
 from msfp_gen.studies.study.loader import load_study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 STATISTICS = {
     "mean": "the mean",
@@ -56,6 +67,7 @@ CHOSEN = 1.5  # exact runs at least, over those of the pilot
 LEAST_SHARE = 0.2  # time of the cheapest runs, over that of the others, at least: so a rare event is seen by them
 EQUAL = 0.25  # of the exact runs after the pilot: chosen with equal chances, whatever the prediction says
 CHEAP = 8  # cheap runs for each exact one in the pilot
+WIDTH, HEIGHT = 6.8, 4.6  # of the figure [inch]
 
 
 @dataclass(frozen=True)
@@ -85,8 +97,8 @@ class Question:
         if needs != (self.threshold is not None):
             rule = "give it" if needs else "leave it out"
             raise InputError(f"accuracy.threshold = {self.threshold}: {rule} with statistic = {self.statistic!r}")
-        if self.statistic == "quantile" and not 0 < (self.threshold or 0.0) < 1:
-            raise InputError(f"accuracy.threshold = {self.threshold:g}: give the share of a quantile, between 0 and 1")
+        if self.statistic == "quantile" and not 0 < self.level < 1:
+            raise InputError(f"accuracy.threshold = {self.level:g}: give the share of a quantile, between 0 and 1")
         if self.target is None and self.budget is None:
             raise InputError("accuracy: give target, such as '2 %', or budget, such as '10 min'")
         for name in self.models or ():
@@ -97,6 +109,18 @@ class Question:
     def of_share(self) -> bool:
         """Whether the statistic follows from probabilities."""
         return self.statistic in ("probability", "quantile")
+
+    @property
+    def level(self) -> float:
+        """The threshold, of a statistic that has one."""
+        assert self.threshold is not None
+        return self.threshold
+
+    def half(self, value: float) -> float:
+        """The half width that is asked for, in the unit of the value."""
+        assert self.target is not None
+        absolute = self.statistic == "probability" or self.logarithmic
+        return self.target if absolute else self.target * abs(value)
 
 
 @dataclass(frozen=True)
@@ -203,58 +227,37 @@ def estimate(
     Exact runs are kept in `folder` as those of any study, runs of cheaper models in folders within it; the same call
     continues. What is not given is that of `[accuracy]` in the study file.
 
-    Parameters
-    ----------
-    source
-        A study file, a table of the same keys, or a `Study`.
-    folder
-        Of the study.
-    quantity, statistic, threshold, target, budget, models, pilot, seed
-        As in `Question`; target and budget also as texts, such as "2 %" and "10 min".
-    workers, threads, executor, dask, mpi
-        As of `study`.
-    progress
-        Called with the name of a model and the number of its runs, before these.
+    source, workers, threads, executor, dask, mpi: as of `study`. folder: of the study. quantity to seed: as in
+    `Question`; target and budget also as texts, such as "2 %" and "10 min". progress: called with the name of a model
+    and the number of its runs, before these.
 
-    Raises
-    ------
-    InputError
-        Invalid input, or a target that the budget does not permit, as the pilot shows: a new folder is removed again.
-    RunError
-        Workers died; the same call continues.
-
+    Raises InputError: invalid input, or a target that the budget does not permit, as the pilot shows: a new folder is
+    removed again; RunError: workers died; the same call continues.
     """
     study = source if isinstance(source, Study) else load_study(source)
     question = question_of(
         study, quantity=quantity, statistic=statistic, threshold=threshold, target=target, budget=budget,
         models=None if models is None else tuple(models), pilot=pilot, seed=seed,
     )  # fmt: skip
-    levels = (EXACT, *_levels(study, question))
+    cheaper = ("backbone", "rigid" if study.keep.counts.bearings else "massless")
+    levels = (EXACT, *(cheaper if question.models is None else question.models))
     assert question.quantity is not None
-    scales, names = _scales(study, question)
-    units = {column.name: column.unit for column in study.keep.columns()}
+    scales, unit = _scales(study, question)
     begun = Path(folder).exists()
     try:
         with pool_from(workers, threads, executor, dask, mpi) as pool:
             runs = StudySource(study, Path(folder), question.quantity, levels, question.seed, pool, progress)
-            if scales is None:
-                unit = units[question.quantity]
+            if scales is not None:
+                result = fragility_of(runs, question, scales, lambda draws: np.log(runs.draws.intensity(draws)))
+            else:
+                result = estimated(runs, question)
+                unit = {column.name: column.unit for column in study.keep.columns()}[question.quantity]
                 unit = {"probability": "", "variance": f"({unit})^2" if unit else ""}.get(question.statistic, unit)
-                return replace(estimated(runs, question), unit=unit)
-            estimate = fragility_of(runs, question, scales, lambda draws: np.log(runs.draws.intensity(draws)))
     except _BudgetError:
         if not begun:
             rmtree(folder, ignore_errors=True)
         raise
-    return replace(estimate, unit=names)
-
-
-def _levels(study: Study, question: Question) -> tuple[str, ...]:
-    """The cheaper models to try, cheapest first."""
-    if question.models is not None:
-        return question.models
-    building = bool(study.keep.counts.bearings)
-    return ("backbone", "rigid" if building else "massless")
+    return replace(result, unit=unit)
 
 
 def _scales(study: Study, question: Question) -> tuple[Array | None, str]:
@@ -290,7 +293,7 @@ class _State:
         values, early = self.source.values(level, draws)
         self.early[level] = int(early.sum())
         if self.question.of_share:
-            bound = (self.question.threshold or 0.0) if self.question.statistic == "probability" else np.inf
+            bound = self.question.level if self.question.statistic == "probability" else np.inf
             return np.where(early & (values < bound), np.inf, values)
         if level == EXACT and np.isinf(values).any():
             raise InputError(
@@ -307,7 +310,8 @@ class _State:
             return [last]
         if self.weights is None:
             exact = self.outcome(EXACT, draws[: self.pilot])
-            self.weights = self._weights(exact, feature(last.values)[: self.pilot])
+            x = feature(last.values)[: self.pilot]
+            self.weights = partial(uncertainty, x, exact, self.bound(exact) if self.question.of_share else None)
         weights = self.weights(feature(last.values))
         chosen, least = [], np.zeros(self.count)
         for level in self.chain[:-1]:
@@ -318,16 +322,11 @@ class _State:
             chosen.append(Runs(here, self.outcome(level, here), chances[here]))
         return [*chosen, last]
 
-    def _weights(self, exact: Array, x: Array) -> Any:
-        bound = self.bound(exact) if self.question.of_share else None
-        return lambda at: uncertainty(x, exact, bound, at)
-
     def bound(self, exact: Array) -> float:
         """The threshold of a probability, or the quantile of the pilot."""
-        assert self.question.threshold is not None
         if self.question.statistic == "probability":
-            return self.question.threshold
-        return float(np.quantile(feature(exact), self.question.threshold))
+            return self.question.level
+        return float(np.quantile(feature(exact), self.question.level))
 
     def grow(self, wanted: Array) -> None:
         """Plan for these numbers of runs of every model, exact first."""
@@ -360,23 +359,28 @@ def _estimated(source: Source, question: Question) -> tuple[Estimate, list[Runs]
     trace: list[tuple[float, float]] = []
     for _ in range(ROUNDS):
         levels = state.levels()
-        value, interval, moment = _answer(question, levels, state.pilot, source.population)
+        answer = _answer(question, levels, state.pilot, source.population)
         spent, runs = source.spent()
-        trace.append((spent, (interval[1] - interval[0]) / 2))
-        if not _more(state, question, value, interval, moment, len(levels[0].draws)):
+        trace.append((spent, answer.half))
+        if not _more(state, answer, spent, len(levels[0].draws)):
             break
+    value, half = answer.value, answer.half
     costs = {level: source.cost(level) for level in runs}
-    half = (interval[1] - interval[0]) / 2
-    if question.target is not None and half > 1.02 * _absolute(question, value):
+    if question.target is not None and half > 1.02 * question.half(value):
         notes.append(f"the target was not reached: the half width is {half:.3g}")
     if question.budget is not None and spent > 1.1 * question.budget:
         notes.append(f"the runs took {spent:.3g} s in place of {question.budget:g} s: a pilot needs that; give fewer")
-    notes += _early_notes(state, runs)
-    plain = _plain_variance(question, levels, value, interval, moment)
+    for level, count in state.early.items():
+        if count and question.of_share:
+            notes.append(f"{count} runs of {level} ended early; they count as above every value")
+        elif count:
+            word = "a lower bound" if level == EXACT else "what they reached"
+            notes.append(f"{count} of {runs.get(level, count)} runs of {level} ended early; their value is {word}")
+    plain = _plain_variance(question, levels, answer)
     seconds = costs[EXACT] * plain * quantile_of_t(np.inf) ** 2 / half**2 if half > 0 else spent
     estimate = Estimate(
-        question.quantity or "", question.statistic, question.threshold, "", value, interval, runs, spent, seconds,
-        correlation, costs, trace=tuple(trace), notes=tuple(notes),
+        question.quantity or "", question.statistic, question.threshold, "", value, answer.interval, runs, spent,
+        seconds, correlation, costs, trace=tuple(trace), notes=tuple(notes),
     )  # fmt: skip
     return estimate, levels, state.pilot
 
@@ -427,52 +431,48 @@ def _linear(one: Array, other: Array) -> float:
     return max(float(np.corrcoef(one, other)[0, 1]), 0.0)
 
 
-def _answer(
-    question: Question, levels: list[Runs], pilot: int, population: int | None
-) -> tuple[float, tuple[float, float], Moment]:
+class _Answer(NamedTuple):
     """Value, interval, and the moment from which the runs are planned."""
+
+    value: float
+    interval: tuple[float, float]
+    moment: Moment
+
+    @property
+    def half(self) -> float:
+        return (self.interval[1] - self.interval[0]) / 2
+
+
+def _answer(question: Question, levels: list[Runs], pilot: int, population: int | None) -> _Answer:
     if question.statistic == "quantile":
-        assert question.threshold is not None
-        return quantile_of(levels, question.threshold, pilot, population)
+        return _Answer(*quantile_of(levels, question.level, pilot, population))
     if question.statistic == "probability":
-        assert question.threshold is not None
-        moment = exceeding(levels, question.threshold, pilot, population)
-        low, high = np.clip([moment.value - moment.half, moment.value + moment.half], 0.0, 1.0)
-        return float(np.clip(moment.value, 0, 1)), (float(low), float(high)), moment
+        moment = exceeding(levels, question.level, pilot, population)
+        value, low, high = np.clip(moment.value + moment.half * np.array([0, -1, 1]), 0.0, 1.0).tolist()
+        return _Answer(value, (low, high), moment)
     if question.statistic == "variance":
         moment = variance_of(levels, pilot, population)
         share = float(np.exp(moment.half / moment.value)) if moment.value > 0 else np.inf
-        return moment.value, (moment.value / share, moment.value * share), moment
+        return _Answer(moment.value, (moment.value / share, moment.value * share), moment)
     moment = telescoped(levels[0].values, levels, pilot, population)
-    return moment.value, (moment.value - moment.half, moment.value + moment.half), moment
-
-
-def _absolute(question: Question, value: float) -> float:
-    """The half width that is asked for, in the unit of the value."""
-    assert question.target is not None
-    absolute = question.statistic == "probability" or question.logarithmic
-    return question.target if absolute else question.target * abs(value)
+    return _Answer(moment.value, (moment.value - moment.half, moment.value + moment.half), moment)
 
 
 class _BudgetError(InputError):
     """A target that the pilot shows to need more than the budget."""
 
 
-def _more(
-    state: _State, question: Question, value: float, interval: tuple[float, float], moment: Moment, exact: int
-) -> bool:
-    """Plan the next round; whether there is one.
+def _more(state: _State, answer: _Answer, spent: float, exact: int) -> bool:
+    """Plan the next round; whether there is one. spent: seconds so far. exact: number of exact runs.
 
     Raises _BudgetError where the pilot alone shows that the budget does not permit the target; later the estimate ends
     with the budget, and a note says so.
     """
+    question, moment, half = state.question, answer.moment, answer.half
     costs = np.array([state.source.cost(level) for level in state.chain])
-    spent, _ = state.source.spent()
-    half = (interval[1] - interval[0]) / 2
-    least = np.array([1e-12 * max(value**2, 1e-300)])
-    variances = np.maximum(moment.variances, least)
+    variances = np.maximum(moment.variances, 1e-12 * max(answer.value**2, 1e-300))
     if question.target is not None:
-        wanted = _absolute(question, value)
+        wanted = question.half(answer.value)
         checked = len(state.chain) == 1 or state.scale[EXACT] > 0 or exact >= state.count
         if half <= wanted and checked:
             return False
@@ -503,16 +503,13 @@ def _more(
     return before != (state.count, state.scale)
 
 
-def _plain_variance(
-    question: Question, levels: list[Runs], value: float, interval: tuple[float, float], moment: Moment
-) -> float:
+def _plain_variance(question: Question, levels: list[Runs], answer: _Answer) -> float:
     """The variance of one plain draw, in the unit of the estimate."""
     if question.statistic == "probability":
-        return max(value * (1 - value), 1e-12)
+        return max(answer.value * (1 - answer.value), 1e-12)
     if question.statistic == "quantile":
-        assert question.threshold is not None
-        slope = (interval[1] - interval[0]) / 2 / max(moment.half, 1e-300)
-        return question.threshold * (1 - question.threshold) * slope**2
+        slope = answer.half / max(answer.moment.half, 1e-300)
+        return question.level * (1 - question.level) * slope**2
     values, weights = levels[0].values, 1 / levels[0].chances
     mean = float(np.average(values, weights=weights))
     squares = (values - mean) ** 2
@@ -521,25 +518,13 @@ def _plain_variance(
     return float(np.average((squares - np.average(squares, weights=weights)) ** 2, weights=weights))
 
 
-def _early_notes(state: _State, runs: Mapping[str, int]) -> list[str]:
-    """Lines about runs that ended early."""
-    notes = []
-    for level, count in state.early.items():
-        if count and state.question.of_share:
-            notes.append(f"{count} runs of {level} ended early; they count as above every value")
-        elif count:
-            word = "a lower bound" if level == EXACT else "what they reached"
-            notes.append(f"{count} of {runs.get(level, count)} runs of {level} ended early; their value is {word}")
-    return notes
-
-
-def fragility_of(source: Source, question: Question, scales: Array, intensity: Any) -> Estimate:
+def fragility_of(source: Source, question: Question, scales: Array, intensity: Callable[[Indices], Array]) -> Estimate:
     """The fragility of a threshold: median and dispersion of the intensity at which a draw reaches it.
 
     intensity: logarithm of the intensity of draws at scale 1. The runs of a draw close in on its crossing; those of the
     exact model begin where the cheapest one crosses.
     """
-    searches = _Searches(source, question, scales, intensity)
+    searches = Searches(source, question.level, scales, intensity)
     mean, levels, pilot = _estimated(searches, replace(question, statistic="mean", threshold=None, logarithmic=True))
     spread = variance_of(levels, pilot, source.population)
     notes = list(mean.notes)
@@ -557,45 +542,49 @@ def fragility_of(source: Source, question: Question, scales: Array, intensity: A
     )  # fmt: skip
 
 
-class _Searches:
-    """A source of crossings: a run of it is the search of a draw."""
+def estimate_table(result: Estimate) -> Table:
+    """The estimate in ten lines at most."""
+    unit = f" {result.unit}" if result.unit else ""
+    threshold = "" if result.threshold is None else f" {result.threshold:g}"
+    runs = ", ".join(f"{count} {name}" for name, count in result.runs.items())
+    rows = [
+        ("value", f"{result.value:.4g}{unit}"),
+        ("interval of 95 %", f"{result.interval[0]:.4g} to {result.interval[1]:.4g}{unit}"),
+    ]
+    if result.dispersion is not None and result.dispersion_interval is not None:
+        low, high = result.dispersion_interval
+        rows.append(("dispersion", f"{result.dispersion:.3g}, {low:.3g} to {high:.3g}"))
+    gain = result.plain_seconds / result.seconds if result.seconds else 1.0
+    rows += [
+        ("runs", runs),
+        ("seconds", f"{result.seconds:.4g}, on one core"),
+        ("plain Monte Carlo", f"{result.plain_seconds:.4g} s for this interval, {gain:.3g} times as many"),
+        ("correlation", ", ".join(f"{name} {rho:.4f}" for name, rho in result.correlation.items()) or "none tried"),
+        ("cost of a run", ", ".join(f"{name} {1e3 * cost:.3g} ms" for name, cost in result.costs.items())),
+    ]
+    return Table(f"{result.statistic}{threshold} of {result.quantity}", (), rows)
 
-    def __init__(self, source: Source, question: Question, scales: Array, intensity: Any) -> None:
-        self.source, self.scales, self.intensity = source, scales, intensity
-        assert question.threshold is not None
-        self.threshold = question.threshold
-        self.levels, self.population = source.levels, source.population
-        self.beyond = 0
-        self._values: dict[str, dict[int, float]] = {level: {} for level in source.levels}
-        self._runs = dict.fromkeys(source.levels, 0)
 
-    def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
-        """Logarithms of the intensities at which draws cross; none ends early."""
-        known = self._values[level]
-        new = np.array([draw for draw in draws.tolist() if draw not in known], dtype=np.intp)
-        if new.size:
-            searches = crossings(self.source, level, new, self.scales, self.threshold, self._guess(level, new))
-            self._runs[level] += searches.runs
-            self.beyond += searches.beyond if level == EXACT else 0
-            known.update(zip(new.tolist(), searches.logarithms.tolist(), strict=True))
-        logs = np.array([known[draw] for draw in draws.tolist()])
-        return logs + self.intensity(draws), np.zeros(len(draws), dtype=bool)
+def plot_estimate(result: Estimate, path: str | Path | None = None, title: str = "") -> Figure:
+    """Half the width of the interval over the seconds of all runs: the mixture as it was, and plain Monte Carlo.
 
-    def _guess(self, level: str, draws: Indices) -> Array:
-        """Where the search of a draw begins: where the cheapest model crosses, shifted by what the pilot showed."""
-        middle = np.full(len(draws), float(np.log(self.scales[len(self.scales) // 2])))
-        cheap = next((name for name in self.levels[1:] if self._values[name] and name != level), None)
-        if level != EXACT or cheap is None:
-            return middle
-        known = self._values[cheap]
-        shifts = [value - known[draw] for draw, value in self._values[level].items() if draw in known]
-        shift = float(np.median(shifts)) if shifts else 0.0
-        return np.array([known.get(draw, at) + shift for draw, at in zip(draws.tolist(), middle, strict=True)])
-
-    def cost(self, level: str) -> float:
-        """Seconds of the search of a draw."""
-        return self.source.cost(level) * self._runs[level] / max(len(self._values[level]), 1)
-
-    def spent(self) -> tuple[float, dict[str, int]]:
-        """As of `Source`."""
-        return self.source.spent()
+    Raises InputError for a path that cannot be written.
+    """
+    seconds, half = np.array(result.trace).T
+    with page(WIDTH, HEIGHT, path) as figure:
+        headline(figure, title or f"{result.statistic} of {labelled(result.quantity, '')}: what an interval costs")
+        axes = figure.subplots()
+        end = half[-1]
+        span = np.geomspace(seconds[0] / 2, 2 * max(result.plain_seconds, seconds[-1]), 100)
+        axes.plot(span, end * np.sqrt(result.plain_seconds / span), color=FAINT, label="plain Monte Carlo")
+        axes.plot(
+            span, end * np.sqrt(result.seconds / span), "--", color=COLOURS[0], linewidth=1, label="as the last round"
+        )
+        axes.plot(seconds, half, "o-", color=COLOURS[0], label="this estimate, round by round")
+        axes.axhline(end, color=INK, linewidth=0.5)
+        text = f"{result.plain_seconds / max(result.seconds, 1e-300):.3g} times"
+        axes.annotate(text, (result.plain_seconds, end), (4, 6), textcoords="offset points")
+        axes.set(xscale="log", yscale="log", xlabel="seconds on one core",
+                 ylabel=labelled("half the width of the interval of 95 %", result.unit))  # fmt: skip
+        axes.legend()
+    return figure

@@ -6,13 +6,17 @@ Geraci, Eldred and Jakeman, *Journal of Computational Physics* 408 (2020), 10925
 pairs of runs, for a probability the normal law about it. That of a draw is fitted to other draws only, so that no run
 is used twice and the estimate has no bias. Exact runs are chosen among the draws with known chances, larger where the
 prediction is unsure.
+
+How many runs each model gets is the closed form of multi-fidelity Monte Carlo: Peherstorfer, Willcox and Gunzburger,
+"Optimal model management for multifidelity Monte Carlo estimation", *SIAM Journal on Scientific Computing* 38 (2016),
+A3163-A3194. Models are ordered from the exact one by falling correlation with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, combinations, pairwise
 from typing import Any
 
 import numpy as np
@@ -22,6 +26,7 @@ from msfp_gen.common.arrays import Array
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 Fit = Callable[[Array, Array, Array], Callable[[Array], Array]]  # of x, y and the weights of these runs
+EXACT = "exact"
 FOLDS = 5  # of the draws: a prediction is fitted to those of the other folds
 LEVEL = 0.95
 LEAST = 0.25  # chance of a draw for a mean, over the mean chance
@@ -250,25 +255,19 @@ def telescoped(
     return Moment(value, float(variance), total, planned, bool(unseen > variance / 2))
 
 
-def _size(level: Runs, pilot: int, count: int) -> float:
-    """How many runs of a pilot are worth those of a level, with chances in proportion to what predictions leave."""
-    main = level.chances[level.draws >= pilot]
-    return float((level.draws < pilot).sum()) + ((count - pilot) * float(main.mean()) if len(main) else 0.0)
-
-
 def _contributions(level: Runs, difference: Array, pilot: int, count: int) -> Array:
     """What every draw adds to `count` times the mean of a difference that is known at some of them; shape (count,).
 
-    The means over the pilot and over the other draws are weighted by the numbers of runs that they are worth.
+    The means over the pilot and over the other draws are weighted by the numbers of runs that they are worth, of the
+    others with chances in proportion to what predictions leave.
     """
     out = np.zeros(count)
     first = level.draws < pilot
-    main = level.chances[~first]
+    main, runs = level.chances[~first], float(first.sum())
     if not len(main):
-        out[level.draws] = difference * count / max(int(first.sum()), 1)
+        out[level.draws] = difference * count / max(runs, 1.0)
         return out
-    worth = _size(level, pilot, count)
-    share = float(first.sum()) / worth
+    share = runs / (runs + (count - pilot) * float(main.mean()))
     out[level.draws[first]] = difference[first] * share * count / max(pilot, 1)
     out[level.draws[~first]] = difference[~first] / main * (1 - share) * count / (count - pilot)
     return out
@@ -353,3 +352,83 @@ def uncertainty(x: Array, values: Array, threshold: float | None, at: Array) -> 
         return np.ones(len(at))
     beyond = np.abs(_extended(x, values, equal)(at) - bent(x, values, equal)(at)) / mean
     return np.maximum(bent(x, left, equal)(at) / mean, LEAST) + beyond
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Models that are used together, the exact one first, and what they save.
+
+    work: seconds that they need for a variance, over those of the exact model alone.
+    """
+
+    models: tuple[str, ...]
+    work: float
+
+
+def shares_of_variance(correlations: Array) -> Array:
+    """The part of the variance of the exact model that each level of a chain has to estimate, shape (k,) [-].
+
+    correlations: of every model with the exact one, which comes first, falling, shape (k,). Each level estimates its
+    difference from the next; the last one estimates its own mean.
+    """
+    squares = np.append(np.asarray(correlations, dtype=float) ** 2, 0.0)
+    shares: Array = squares[:-1] - squares[1:]
+    return shares
+
+
+def work_of(shares: Array, costs: Array) -> float:
+    """Seconds times variance of a chain with optimal numbers of runs, over those of plain Monte Carlo.
+
+    shares: of variance, shape (k,). costs: of a run of each model [s], shape (k,).
+    """
+    return float(np.sum(np.sqrt(shares * costs)) ** 2 / costs[0])
+
+
+def optimal_runs(
+    variances: Array, costs: Array, *, variance: float | None = None, seconds: float | None = None
+) -> Array:
+    """Numbers of runs of each level, not rounded, for a variance of the estimate or for a time [s]; shape (k,).
+
+    variances: that each level has to estimate. They are in proportion to sqrt(variance / cost), and a level has no
+    fewer runs than the one before it.
+    """
+    ratios = np.maximum.accumulate(np.sqrt(np.maximum(variances, 0.0) / costs) + 1e-300)
+    if variance is not None:
+        return np.asarray(ratios * float(np.sum(variances / ratios)) / variance)
+    assert seconds is not None
+    return np.asarray(ratios * seconds / float(np.sum(ratios * costs)))
+
+
+def factor_for(weights: Array, wanted: float, least: float = 0.0) -> float:
+    """The factor with which chances in proportion to weights choose as many draws as wanted on average.
+
+    Chances are at most 1. least: what is added to each of them.
+    """
+    from scipy.optimize import brentq
+
+    if wanted <= least * len(weights) or not len(weights):
+        return 0.0
+    most = float(1 / weights.min())
+    if wanted >= len(weights):
+        return most
+
+    def excess(factor: float) -> float:
+        return float(np.minimum(factor * weights + least, 1.0).sum()) - wanted
+
+    return float(brentq(excess, 0.0, most, xtol=1e-12 * most))
+
+
+def best_chain(correlations: Mapping[str, float], costs: Mapping[str, float]) -> Chain:
+    """The models whose use together is cheapest: all subsets are compared by the closed form.
+
+    correlations: model -> that with the exact one. costs: model -> seconds of a run, the exact one's included.
+    """
+    cheaper = sorted((name for name in correlations if name != EXACT), key=lambda name: -abs(correlations[name]))
+    best = Chain((EXACT,), 1.0)
+    for chosen in chain.from_iterable(combinations(cheaper, count + 1) for count in range(len(cheaper))):
+        shares = shares_of_variance(np.array([1.0, *(abs(correlations[name]) for name in chosen)]))
+        paid = np.array([costs[name] for name in (EXACT, *chosen)])
+        rising = (shares >= 0).all() and (np.diff(shares / paid) > 0).all()  # numbers of runs along the chain
+        if rising and (work := work_of(shares, paid)) < best.work:
+            best = Chain((EXACT, *chosen), work)
+    return best

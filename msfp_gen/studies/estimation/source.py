@@ -2,12 +2,16 @@
 
 A draw is a combination of the values of the axes with values, each as likely as any other, and a value of each random
 axis. Draw k is the same for every model, in every call.
+
+For a fragility a run is the search for the intensity at which the quantity of a draw reaches a threshold. The runs of
+the search are at the scales of the study. They close in on the two neighbours between which the threshold lies, and
+power laws between neighbours give the crossing (Vamvatsikos and Cornell, 2002, trace and fill an IDA curve alike).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -18,9 +22,8 @@ from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.specification import formula
 from msfp_gen.studies.assessment.rows import numbers, read_study
 from msfp_gen.studies.columns import Keep
-from msfp_gen.studies.estimation.allocation import EXACT
 from msfp_gen.studies.estimation.backbone_run import OF_SURFACES, QUANTITIES, check_backbone
-from msfp_gen.studies.estimation.estimators import Flags, Indices
+from msfp_gen.studies.estimation.estimators import EXACT, Flags, Indices
 from msfp_gen.studies.pool import Pool
 from msfp_gen.studies.study.axes import Sampling, SceneFactory, values_at
 from msfp_gen.studies.study.chunks import STUDY_FILE, parts_in, readable_parts, study_table
@@ -255,3 +258,103 @@ def _names_in(keep: Keep, quantity: str) -> list[str]:
     if "(" in text and any(f"{word}(" in text for word in ("peak", "least", "most", "last")):
         return [text]
     return sorted(formula.names_in(formula.parse(text, [*keep.known, *keep.axes])))
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Logarithms of scales at which draws reach a threshold, shape (k,) [-], and how many are beyond the study.
+
+    runs: that the draws took, all together.
+    """
+
+    logarithms: Array
+    beyond: int
+    runs: int
+
+
+def crossings(source: Source, level: str, draws: Indices, scales: Array, threshold: float, guess: Array) -> Crossings:
+    """Find where draws reach a threshold.
+
+    scales: rising. guess: of the logarithm of the scale of each crossing, with which the search begins.
+    """
+    count, most = len(draws), len(scales)
+    low, high = np.full(count, -1), np.full(count, most)  # neighbours: below, and at or above the threshold
+    values = np.full((count, most), np.nan)
+    following = np.searchsorted(np.log(scales), guess).clip(0, most - 1)
+    runs = 0
+    while (open_ := np.flatnonzero(high - low > 1)).size:
+        at = following[open_]
+        reached, early = source.values(level, draws[open_], at)
+        values[open_, at] = np.where(early & (reached < threshold), np.inf, reached)
+        runs += len(open_)
+        over = values[open_, at] >= threshold
+        high[open_] = np.where(over, np.minimum(at, high[open_]), high[open_])
+        low[open_] = np.where(over, low[open_], np.maximum(at, low[open_]))
+        following = _following(low, high, following, most)
+    logs = np.array(
+        [_crossing(np.log(scales), row, lo, hi, threshold) for row, lo, hi in zip(values, low, high, strict=True)]
+    )
+    return Crossings(logs, int(((low < 0) | (high >= most)).sum()), runs)
+
+
+def _following(low: Indices, high: Indices, last: Indices, most: int) -> Indices:
+    """The scale to run next: a neighbour of the last one as long as one side is not known, else the middle."""
+    step = np.where(last == low, low + 1, high - 1)
+    middle = (low + high) // 2
+    known = (low >= 0) & (high < most)
+    return np.where(known, middle, step).clip(0, most - 1)
+
+
+def _crossing(logs: Array, values: Array, low: int, high: int, threshold: float) -> float:
+    """The crossing between two neighbours, by a power law; beyond the scales half a step from the last one."""
+    if low < 0:
+        return float(logs[0] - (logs[1] - logs[0]) / 2)
+    if high >= len(logs):
+        return float(logs[-1] + (logs[-1] - logs[-2]) / 2)
+    below, above = values[low], values[high]
+    if not np.isfinite(above) or not 0 < below < above:
+        return float((logs[low] + logs[high]) / 2)
+    share = np.log(threshold / below) / np.log(above / below)
+    return float(logs[low] + share * (logs[high] - logs[low]))
+
+
+class Searches:
+    """A source of crossings: a run of it is the search of a draw. intensity: logarithm of that of draws at scale 1."""
+
+    def __init__(self, source: Source, threshold: float, scales: Array, intensity: Callable[[Indices], Array]) -> None:
+        self.source, self.threshold, self.scales, self.intensity = source, threshold, scales, intensity
+        self.levels, self.population = source.levels, source.population
+        self.beyond = 0
+        self._values: dict[str, dict[int, float]] = {level: {} for level in source.levels}
+        self._runs = dict.fromkeys(source.levels, 0)
+
+    def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
+        """Logarithms of the intensities at which draws cross; none ends early."""
+        known = self._values[level]
+        new = np.array([draw for draw in draws.tolist() if draw not in known], dtype=np.intp)
+        if new.size:
+            searches = crossings(self.source, level, new, self.scales, self.threshold, self._guess(level, new))
+            self._runs[level] += searches.runs
+            self.beyond += searches.beyond if level == EXACT else 0
+            known.update(zip(new.tolist(), searches.logarithms.tolist(), strict=True))
+        logs = np.array([known[draw] for draw in draws.tolist()])
+        return logs + self.intensity(draws), np.zeros(len(draws), dtype=bool)
+
+    def _guess(self, level: str, draws: Indices) -> Array:
+        """Where the search of a draw begins: where the cheapest model crosses, shifted by what the pilot showed."""
+        middle = np.full(len(draws), float(np.log(self.scales[len(self.scales) // 2])))
+        cheap = next((name for name in self.levels[1:] if self._values[name] and name != level), None)
+        if level != EXACT or cheap is None:
+            return middle
+        known = self._values[cheap]
+        shifts = [value - known[draw] for draw, value in self._values[level].items() if draw in known]
+        shift = float(np.median(shifts)) if shifts else 0.0
+        return np.array([known.get(draw, at) + shift for draw, at in zip(draws.tolist(), middle, strict=True)])
+
+    def cost(self, level: str) -> float:
+        """Seconds of the search of a draw."""
+        return self.source.cost(level) * self._runs[level] / max(len(self._values[level]), 1)
+
+    def spent(self) -> tuple[float, dict[str, int]]:
+        """As of `Source`."""
+        return self.source.spent()

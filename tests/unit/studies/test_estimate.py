@@ -14,12 +14,19 @@ from msfp_gen.scene.fidelity import Backbone
 from msfp_gen.scene.file.loader import bearing_from_table
 from msfp_gen.studies import estimate, fragility, ida, read_study
 from msfp_gen.studies.batch import run_to_end
-from msfp_gen.studies.estimation.allocation import best_chain, optimal_runs, shares_of_variance, work_of
 from msfp_gen.studies.estimation.backbone_run import parallel
-from msfp_gen.studies.estimation.crossing import crossings
-from msfp_gen.studies.estimation.estimate import Question, estimated, fragility_of
-from msfp_gen.studies.estimation.estimators import Runs, exceeding, quantile_of, telescoped
-from msfp_gen.studies.estimation.figure import estimate_table, plot_estimate
+from msfp_gen.studies.estimation.estimate import Question, estimate_table, estimated, fragility_of, plot_estimate
+from msfp_gen.studies.estimation.estimators import (
+    Runs,
+    best_chain,
+    exceeding,
+    optimal_runs,
+    quantile_of,
+    shares_of_variance,
+    telescoped,
+    work_of,
+)
+from msfp_gen.studies.estimation.source import crossings
 from msfp_gen.studies.study.loader import example_text
 
 SPREAD, NOISE = 0.5, 0.1  # standard deviation of the logarithm, and share of it that the cheap model does not see
