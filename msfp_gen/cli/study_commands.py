@@ -203,9 +203,8 @@ def ida(
     as_json: AsJson = False,
 ) -> None:
     """Curves of demand over intensity, one for each record, and their fractiles."""
-    from msfp_gen.studies.assessment.figures import plot_ida
     from msfp_gen.studies.assessment.ida import ida as analyse
-    from msfp_gen.studies.assessment.ida import ida_table
+    from msfp_gen.studies.assessment.ida import ida_table, plot_ida
     from msfp_gen.studies.assessment.rows import chosen_rows, read_study
 
     _check(plot, output)
@@ -247,9 +246,8 @@ def fragility(
     as_json: AsJson = False,
 ) -> None:
     """Lognormal fragility curves by maximum likelihood, with confidence bands, one for each threshold."""
-    from msfp_gen.studies.assessment.figures import plot_fragility
     from msfp_gen.studies.assessment.fragility import fragility as analyse
-    from msfp_gen.studies.assessment.fragility import fragility_frame, fragility_table
+    from msfp_gen.studies.assessment.fragility import fragility_frame, fragility_table, plot_fragility
     from msfp_gen.studies.assessment.rows import chosen_rows, read_study
 
     _check(plot, output)
@@ -271,9 +269,8 @@ def tornado(
     as_json: AsJson = False,
 ) -> None:
     """The change of a quantity with each random axis alone; for `sampling.method = "one-at-a-time"`."""
-    from msfp_gen.studies.assessment.figures import plot_tornado
+    from msfp_gen.studies.assessment.sensitivity import plot_tornado, tornado_table
     from msfp_gen.studies.assessment.sensitivity import tornado as analyse
-    from msfp_gen.studies.assessment.sensitivity import tornado_table
 
     _check(plot, output)
     result = analyse(folder, quantity, statistic)
@@ -292,9 +289,8 @@ def sobol(
     as_json: AsJson = False,
 ) -> None:
     """First-order and total Sobol' indices of a quantity; for `sampling.method = "sobol-indices"`, with SALib."""
-    from msfp_gen.studies.assessment.figures import plot_sobol
+    from msfp_gen.studies.assessment.sensitivity import plot_sobol, sobol_table
     from msfp_gen.studies.assessment.sensitivity import sobol as analyse
-    from msfp_gen.studies.assessment.sensitivity import sobol_table
 
     _check(plot, output)
     result = analyse(folder, quantity, statistic, level)
@@ -359,8 +355,7 @@ def pareto(
     as_json: AsJson = False,
 ) -> None:
     """Search the random axes of a study for the Pareto front of its quantities, by NSGA-II of pymoo."""
-    from msfp_gen.studies.assessment.figures import plot_pareto
-    from msfp_gen.studies.assessment.pareto import DESIGNS, Goals, front_table
+    from msfp_gen.studies.assessment.pareto import DESIGNS, Goals, front_table, plot_pareto
     from msfp_gen.studies.assessment.pareto import pareto as search
 
     if plot is not None:

@@ -7,16 +7,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from msfp_gen.studies.assessment.figures import plot_fragility as plot_fragility
-    from msfp_gen.studies.assessment.figures import plot_ida as plot_ida
-    from msfp_gen.studies.assessment.figures import plot_pareto as plot_pareto
-    from msfp_gen.studies.assessment.figures import plot_sobol as plot_sobol
-    from msfp_gen.studies.assessment.figures import plot_tornado as plot_tornado
     from msfp_gen.studies.assessment.fragility import fragility as fragility
+    from msfp_gen.studies.assessment.fragility import plot_fragility as plot_fragility
     from msfp_gen.studies.assessment.ida import ida as ida
+    from msfp_gen.studies.assessment.ida import plot_ida as plot_ida
     from msfp_gen.studies.assessment.pareto import Goals as Goals
     from msfp_gen.studies.assessment.pareto import pareto as pareto
+    from msfp_gen.studies.assessment.pareto import plot_pareto as plot_pareto
     from msfp_gen.studies.assessment.rows import read_study as read_study
+    from msfp_gen.studies.assessment.sensitivity import plot_sobol as plot_sobol
+    from msfp_gen.studies.assessment.sensitivity import plot_tornado as plot_tornado
     from msfp_gen.studies.assessment.sensitivity import sobol as sobol
     from msfp_gen.studies.assessment.sensitivity import tornado as tornado
     from msfp_gen.studies.estimation.estimate import Estimate as Estimate
@@ -39,12 +39,12 @@ _MODULES = {
     "read_study": "assessment.rows",
     "sobol": "assessment.sensitivity",
     "tornado": "assessment.sensitivity",
-    "plot_fragility": "assessment.figures",
-    "plot_ida": "assessment.figures",
+    "plot_fragility": "assessment.fragility",
+    "plot_ida": "assessment.ida",
     "pareto": "assessment.pareto",
-    "plot_pareto": "assessment.figures",
-    "plot_sobol": "assessment.figures",
-    "plot_tornado": "assessment.figures",
+    "plot_pareto": "assessment.pareto",
+    "plot_sobol": "assessment.sensitivity",
+    "plot_tornado": "assessment.sensitivity",
     "Status": "study.chunks",
     "load_study": "study.loader",
     "study_status": "study.chunks",

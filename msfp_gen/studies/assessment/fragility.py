@@ -9,14 +9,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
+from msfp_gen.common.fields import Choice
 from msfp_gen.common.tables import Table
-from msfp_gen.studies.assessment.rows import complete, demands, intensities, unit_of, unknown_column
+from msfp_gen.figures.style import COLOURS, headline, page, plain
+from msfp_gen.scene.file.catalogue import parsed
+from msfp_gen.studies.assessment.rows import (
+    SIZE,
+    check_columns,
+    check_share,
+    complete,
+    demands,
+    intensities,
+    labelled,
+    scale_of,
+    unit_of,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ITERATIONS = 100
 CONVERGED = 1e-10  # of the Newton decrement
@@ -27,6 +44,8 @@ EARLY = {
 }
 LEAST_BOOTSTRAPS = 100
 POINTS = 200  # of a curve that is written
+DRAWN = 300  # points of a curve in a figure
+SHADE = 0.16  # opacity of a confidence band
 Interval = tuple[float, float]
 
 
@@ -50,12 +69,12 @@ class Fit:
         """1/b."""
         return float(1 / self.coefficients[1])
 
-    def errors(self) -> tuple[float, float]:
-        """Standard errors of the logarithms of median and dispersion, to first order."""
+    @property
+    def errors(self) -> Array:
+        """Standard errors of the logarithms of median and dispersion, to first order, shape (2,) [-]."""
         a, b = self.coefficients
-        of_median, of_dispersion = np.array([-1 / b, a / b**2]), np.array([0.0, -1 / b])
-        values = [float(np.sqrt(slope @ self.covariance @ slope)) for slope in (of_median, of_dispersion)]
-        return values[0], values[1]
+        slopes = np.array([[-1 / b, a / b**2], [0.0, -1 / b]])
+        return np.sqrt(np.diag(slopes @ self.covariance @ slopes.T))
 
     def probability(self, log_x: Array) -> Array:
         """Phi(a + b ln x) [-], of the shape of `log_x`."""
@@ -84,19 +103,14 @@ def fitted(log_x: Array, runs: Array, over: Array, where: str, start: Fit | None
     _check(log_x, runs, over, where)
     middle, width = float(np.average(log_x, weights=runs)), float(np.ptp(log_x))
     scaled = (log_x - middle) / width  # between -1 and 1, for the conditioning of the normal equations
-    guess = np.array([0.0, 1.0]) if start is None else _scaled(start.coefficients, middle, width)
+    back = np.array([[1.0, -middle / width], [0.0, 1 / width]])
+    guess = np.array([0.0, 1.0]) if start is None else np.linalg.solve(back, start.coefficients)
     rows = np.stack([np.ones_like(scaled), scaled], axis=-1)
     solution, information = _newton(rows, runs, over, guess, where)
-    back = np.array([[1.0, -middle / width], [0.0, 1 / width]])
     coefficients = back @ solution
     if not coefficients[1] > 0:
         raise InputError(f"{where}: exceedances do not grow with the intensity; there is no fragility curve")
     return Fit(coefficients, back @ np.linalg.inv(information) @ back.T)
-
-
-def _scaled(coefficients: Array, middle: float, width: float) -> Array:
-    a, b = coefficients
-    return np.array([a + b * middle, b * width])
 
 
 def _check(log_x: Array, runs: Array, over: Array, where: str) -> None:
@@ -229,39 +243,20 @@ def fragility(
     A run exceeds a threshold where its demand is not below it. A run that ended early has a demand of at least what it
     reached: it exceeds the thresholds that it reached, and `early` says what it is for the others.
 
-    Parameters
-    ----------
-    rows
-        DataFrame of `read_study`, or a part of it.
-    measure, demand
-        Columns of the intensity measure, such as `scale`, and of the demand.
-    thresholds
-        Damage states.
-    early
-        "leave-out", "exceed" or "refuse".
-    level
-        Of confidence of intervals and bands.
-    bootstrap
-        Number of bootstrap samples; 0: intervals from the Fisher information, which takes all runs for independent.
-    cluster
-        Column whose values are drawn as a whole by the bootstrap: the runs of one record depend on each other.
-    seed
-        Of the bootstrap.
-    by
-        Column for each of whose values the curves are fitted apart, such as `bounds`.
+    rows: DataFrame of `read_study`, or a part of it. measure, demand: columns of the intensity measure, such as
+    `scale`, and of the demand. thresholds: damage states. early: a key of EARLY. level: of confidence of intervals and
+    bands. bootstrap: number of samples; 0: intervals from the Fisher information, which takes all runs for
+    independent. cluster: column whose values are drawn as a whole by the bootstrap: the runs of one record depend on
+    each other. seed: of the bootstrap. by: column for each of whose values the curves are fitted apart, such as
+    `bounds`.
 
-    Raises
-    ------
-    InputError
-        Unknown columns, or runs that determine no curve: none or all exceed, or the two kinds do not overlap.
-
+    Raises InputError: unknown columns, or runs that determine no curve: none or all exceed, or the two kinds do not
+    overlap.
     """
     if not thresholds or len(set(thresholds)) < len(thresholds):
         raise InputError(f"thresholds = {list(thresholds)}: give one or more different values of {demand}")
-    if not 0 < level < 1:
-        raise InputError(f"level = {level:g}: give a share between 0 and 1, such as 0.95")
-    if early not in EARLY:
-        raise InputError(f"early = {early!r}: give one of {', '.join(map(repr, EARLY))}")
+    check_share("level", level)
+    parsed(Choice(EARLY), early, "early")
     states: list[DamageState] = []
     for case, chosen in _cases(rows, by):
         x, y, ended = intensities(chosen, measure), demands(chosen, demand), complete(chosen)
@@ -279,8 +274,7 @@ def _cases(rows: Any, by: str | None) -> list[tuple[str, Any]]:
     """Each value of a column, in the order in which they occur, and its rows; all rows without a column."""
     if by is None:
         return [("", rows)]
-    if by not in rows.columns:
-        raise unknown_column(by, list(rows.columns))
+    check_columns([by], rows.columns)
     return [(str(value), rows[rows[by] == value]) for value in rows[by].unique()]
 
 
@@ -292,8 +286,7 @@ def _groups(rows: Any, cluster: str, bootstrap: int) -> Any:
         return None
     if bootstrap < LEAST_BOOTSTRAPS:
         raise InputError(f"bootstrap = {bootstrap}: give at least {LEAST_BOOTSTRAPS} samples, or 0")
-    if cluster not in rows.columns:
-        raise unknown_column(cluster, list(rows.columns))
+    check_columns([cluster], rows.columns)
     groups = pd.factorize(rows[cluster])[0]
     if groups.max(initial=0) < 1:
         raise InputError(f"cluster = {cluster!r}: all runs have the same; give another column")
@@ -323,28 +316,18 @@ def _state(
     runs = np.asarray(np.bincount(place), dtype=float)
     over = np.asarray(np.bincount(place, weights=exceeded), dtype=float)
     fit = fitted(log_levels, runs, over, where)
-    z = float(ndtri((1 + level) / 2))
+    ends = np.array([(1 - level) / 2, (1 + level) / 2])
     samples = None if drawn is None else _bootstrap(log_levels, place, exceeded, fit, *drawn)
     if samples is None:
-        error_median, error_dispersion = fit.errors()
-        median_interval = _spread(fit.median, z * error_median)
-        dispersion_interval = _spread(fit.dispersion, z * error_dispersion)
+        spread = [np.exp(ndtri(ends) * error) for error in fit.errors]
+        intervals = [fit.median * spread[0], fit.dispersion * spread[1]]
     else:
-        ends = [(1 - level) / 2, (1 + level) / 2]
-        median_interval = _pair(np.quantile(np.exp(-samples[:, 0] / samples[:, 1]), ends))
-        dispersion_interval = _pair(np.quantile(1 / samples[:, 1], ends))
+        intervals = [np.quantile(np.exp(-samples[:, 0] / samples[:, 1]), ends), np.quantile(1 / samples[:, 1], ends)]
+    of_median, of_dispersion = (tuple(interval.tolist()) for interval in intervals)
     return DamageState(
-        threshold, fit.median, fit.dispersion, median_interval, dispersion_interval, len(x), int(over.sum()), left_out,
+        threshold, fit.median, fit.dispersion, of_median, of_dispersion, len(x), int(over.sum()), left_out,
         np.exp(log_levels), runs, over, fit, samples, level,
     )  # fmt: skip
-
-
-def _spread(value: float, log_error: float) -> Interval:
-    return float(value * np.exp(-log_error)), float(value * np.exp(log_error))
-
-
-def _pair(values: Array) -> Interval:
-    return float(values[0]), float(values[1])
 
 
 def _bootstrap(levels: Array, place: Any, exceeded: Any, fit: Fit, groups: Any, count: int, seed: int) -> Array:
@@ -405,3 +388,30 @@ def fragility_table(result: Fragility) -> Table:
     level = f"{100 * result.states[0].level:g} %"
     measure = f" [{result.measure_unit}]" if result.measure_unit else ""
     return Table(f"fragility by {result.measure}{measure}, lognormal, intervals of {level}", columns, rows)
+
+
+def plot_fragility(result: Fragility, path: str | Path | None = None, title: str = "") -> Figure:
+    """Probability of exceedance over intensity: curve, confidence band and observed shares of every damage state.
+
+    Raises InputError for a path that cannot be written.
+    """
+    every = np.concatenate([state.intensity for state in result.states])
+    x = np.geomspace(every.min(), every.max(), DRAWN)
+    scale = scale_of([state.threshold for state in result.states], result.unit)
+    with page(*SIZE, path) as figure:
+        headline(figure, title or "fragility")
+        axes = figure.subplots()
+        for state, colour in zip(result.states, COLOURS * len(result.states), strict=False):
+            name = f"{state.case} {state.threshold * scale.factor:.4g} {scale.unit}".strip()
+            text = f"{plain(name)}: θ = {state.median:.3g}, β = {state.dispersion:.2g}"
+            axes.plot(x, state.probability(x), color=colour, label=text)
+            axes.fill_between(x, *state.band(x), color=colour, alpha=SHADE, linewidth=0)
+            if state.runs_at.max() > 1:  # levels with several runs have a share
+                axes.plot(state.intensity, state.exceeded_at / state.runs_at, "o", color=colour, markersize=3.5)
+        axes.set(
+            xlabel=labelled(result.measure, result.measure_unit),
+            ylabel=f"probability that {labelled(result.demand, '')} exceeds",
+            ylim=(0, 1),
+        )
+        axes.legend(title=f"threshold, with bands of {100 * result.states[0].level:g} %")
+    return figure

@@ -5,18 +5,33 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.studies.assessment.rows import complete, demands, intensities, unit_of, unknown_column
+from msfp_gen.figures.style import COLOURS, FAINT, INK, THIN, headline, page
+from msfp_gen.studies.assessment.rows import (
+    SIZE,
+    check_columns,
+    complete,
+    demands,
+    intensities,
+    labelled,
+    scale_of,
+    unit_of,
+)
 from msfp_gen.studies.study.axes import INTENSITY
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FRACTILES = (0.16, 0.5, 0.84)
 POINTS = 50  # of the fractiles of curves with different intensities
+MOST_CURVES = 400  # that are drawn one by one
 SCALE = "scale"  # the axis by which [records] scales them
 Curve = tuple[Array, Array, Any]  # intensities, demands, and which runs reached their end
 
@@ -41,6 +56,11 @@ class Ida:
     curves: Any
     fractiles: Any
 
+    @property
+    def shares(self) -> list[str]:
+        """The columns of the fractiles, such as `p50`."""
+        return [name for name in self.fractiles.columns if name.startswith("p")]
+
 
 def ida(rows: Any, measure: str, demand: str, fractiles: Sequence[float] = FRACTILES) -> Ida:
     """IDA curves, and the fractiles of the demand at each intensity.
@@ -51,22 +71,9 @@ def ida(rows: Any, measure: str, demand: str, fractiles: Sequence[float] = FRACT
     of it and the next, so that the median of an even number is the mean of the middle two. Where the curves have
     different intensities, such as spectral accelerations, their demands are interpolated, from zero at zero.
 
-    Parameters
-    ----------
-    rows
-        DataFrame of `read_study`, or a part of it.
-    measure
-        Column of the intensity measure, such as `scale` or `intensity`.
-    demand
-        Column of the demand, such as `peak_displacement`.
-    fractiles
-        Shares between 0 and 1.
-
-    Raises
-    ------
-    InputError
-        Unknown columns, intensities that are not positive, curves of a single intensity, or invalid fractiles.
-
+    rows: DataFrame of `read_study`, or a part of it. measure: column of the intensity measure, such as `scale` or
+    `intensity`. demand: column of the demand, such as `peak_displacement`. fractiles: shares between 0 and 1. Raises
+    InputError: unknown columns, intensities that are not positive, curves of a single intensity, or invalid fractiles.
     """
     import pandas as pd
 
@@ -92,10 +99,8 @@ def _fractile(values: Array, share: float) -> Array:
     count = share * len(values)
     whole = round(count)
     if abs(count - whole) < 1e-9 * len(values):  # the share of a number may miss a whole number by roundoff
-        middle: Array = values[max(whole, 1) - 1 : whole + 1].mean(axis=0)
-        return middle
-    reached: Array = values[ceil(count) - 1]
-    return reached
+        return np.asarray(values[max(whole, 1) - 1 : whole + 1].mean(axis=0))
+    return np.asarray(values[ceil(count) - 1])
 
 
 def _levels(curves: list[Curve]) -> Array:
@@ -130,20 +135,42 @@ def _curve_numbers(rows: Any, measure: str) -> Any:
 def axes_of(rows: Any) -> list[str]:
     """The columns of the axes: those between `run` and `status`. Raises InputError where these are not there."""
     names = list(rows.columns)
-    for name in ("run", "status"):
-        if name not in names:
-            raise unknown_column(name, names)
+    check_columns(("run", "status"), names)
     return names[names.index("run") + 1 : names.index("status")]
 
 
 def ida_table(result: Ida) -> Table:
     """The fractiles for a terminal."""
-    shares = [name for name in result.fractiles.columns if name.startswith("p")]
     rows = [
         [f"{row[result.measure]:.4g}", f"{row['curves']:.0f}", f"{row['ended_early']:.0f}"]
-        + ["beyond" if np.isinf(row[name]) else f"{row[name]:.4g}" for name in shares]
+        + ["beyond" if np.isinf(row[name]) else f"{row[name]:.4g}" for name in result.shares]
         for _, row in result.fractiles.iterrows()
     ]
     unit = f" [{result.unit}]" if result.unit else ""
     title = f"fractiles of {result.demand}{unit} by {result.measure}"
-    return Table(title, (result.measure, "curves", "ended early", *shares), rows)
+    return Table(title, (result.measure, "curves", "ended early", *result.shares), rows)
+
+
+def plot_ida(result: Ida, path: str | Path | None = None, title: str = "") -> Figure:
+    """Intensity over demand: every curve, with a cross where a run ended early, and the fractiles.
+
+    Raises InputError for a path that cannot be written.
+    """
+    scale = scale_of(result.curves[result.demand], result.unit)
+    with page(*SIZE, path) as figure:
+        headline(figure, title or "incremental dynamic analysis")
+        axes = figure.subplots()
+        for number, curve in result.curves.groupby("curve"):
+            if number > MOST_CURVES:
+                break
+            x, y = curve[result.measure], scale.factor * curve[result.demand]
+            axes.plot([0.0, *y], [0.0, *x], color=FAINT, linewidth=THIN / 2, alpha=0.6)
+            early = ~curve["ended"]
+            axes.plot(y[early][:1], x[early][:1], "x", color=FAINT, markersize=4)
+        for name, colour in zip(result.shares, (COLOURS[0], INK, COLOURS[1], *COLOURS[2:]), strict=False):
+            values = np.where(np.isinf(result.fractiles[name]), np.nan, scale.factor * result.fractiles[name])
+            axes.plot([0.0, *values], [0.0, *result.fractiles[result.measure]], color=colour, label=f"{name[1:]} %")
+        axes.set(xlabel=labelled(result.demand, scale.unit), ylabel=labelled(result.measure, result.measure_unit))
+        axes.set(xlim=(0, None), ylim=(0, None))
+        axes.legend(title="fractile of demand")
+    return figure

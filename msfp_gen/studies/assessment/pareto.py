@@ -5,19 +5,33 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.studies.assessment.rows import STATISTICS, complete, numbers, read_study, unknown_column, write_frame
+from msfp_gen.figures.style import COLOURS, FAINT, PALE, headline, page
+from msfp_gen.studies.assessment.rows import (
+    SIZE,
+    STATISTICS,
+    check_columns,
+    complete,
+    labelled,
+    numbers,
+    read_study,
+    scale_of,
+    write_frame,
+)
 from msfp_gen.studies.pool import Pool, pool_from, require
 from msfp_gen.studies.study.axes import Sampling, values_at
 from msfp_gen.studies.study.definition import Study
 from msfp_gen.studies.study.loader import load_study
 from msfp_gen.studies.study.run import run_on
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LARGEST = 1e30  # objective of a design that is not feasible, so that every feasible one is better
 DESIGNS = "designs.parquet"
@@ -82,32 +96,20 @@ def pareto(
     Each generation is a study of its own in `output`, so that the same call continues a search that was interrupted.
     A design with a run that ended early is not feasible.
 
-    Parameters
-    ----------
-    source
-        A study file, or a table; its random axes are the design variables, its other axes, such as records, the runs of
-        each design. `[sampling]` is not used.
-    output
-        Folder of the search: `designs.parquet`, and a folder for each generation.
-    goals
-        Objectives and limits.
-    population, generations, seed
-        Of NSGA-II; designs are population x generations.
-    progress
-        Called with the generations that are done, and all.
-    engine
-        `workers`, `threads`, `executor`, `dask` or `mpi`, as of `study`.
+    source: a study file, or a table; its random axes are the design variables, its other axes, such as records, the
+    runs of each design. `[sampling]` is not used. output: folder of the search: `designs.parquet`, and a folder for
+    each generation. goals: objectives and limits. population, generations, seed: of NSGA-II; designs are population x
+    generations. progress: called with the generations that are done, and all. engine: `workers`, `threads`,
+    `executor`, `dask` or `mpi`, as of `study`.
 
-    Raises
-    ------
-    InputError
-        Invalid input; nothing was computed.
-    RunError
-        Workers died; the same call continues.
-
+    Raises InputError: invalid input; nothing was computed; RunError: workers died; the same call continues.
     """
     require("pymoo", "pymoo", "a Pareto search")
-    study = _search_study(source)
+    study = load_study(source, design=True)
+    if not any(axis.random for axis in study.axes):
+        raise InputError(
+            "axes: none has a distribution, so that there is nothing to search; give its bounds as `uniform`"
+        )
     _check(study, goals, population, generations)
     folder = Path(output)
     with pool_from(**engine) as pool:
@@ -122,24 +124,12 @@ def pareto(
     return _front(generation_designs, goals, folder)
 
 
-def _search_study(source: str | Path | Mapping[str, Any]) -> Study:
-    """The study with one design, at the medians of the axes."""
-    study = load_study(source, design=True)
-    if not any(axis.random for axis in study.axes):
-        raise InputError(
-            "axes: none has a distribution, so that there is nothing to search; give its bounds as `uniform`"
-        )
-    return study
-
-
 def _check(study: Study, goals: Goals, population: int, generations: int) -> None:
     """Raise InputError for goals that the study does not have."""
     known = [column.name for column in study.keep.columns() if not column.text]
     if len(goals.names) < 2 or len(set(goals.names)) < len(goals.names):
         raise InputError("pareto: give two or more different quantities to minimise or maximise")
-    for name in (*goals.names, *(goals.at_most or {})):
-        if name not in known:
-            raise unknown_column(name, known)
+    check_columns((*goals.names, *(goals.at_most or {})), known)
     if goals.statistic not in STATISTICS:
         raise InputError(f"statistic = {goals.statistic!r}: give one of {', '.join(STATISTICS)}")
     for word, value, least in (("population", population, 4), ("generations", generations, 1)):
@@ -231,3 +221,28 @@ def front_table(front: Front) -> Table:
     count, feasible = len(front.designs), int(front.designs.feasible.sum())
     title = f"{len(chosen)} designs on the Pareto front, of {feasible} feasible ones among {count}"
     return Table(title, columns, rows)
+
+
+def plot_pareto(result: Front, path: str | Path | None = None, title: str = "") -> Figure:
+    """The first two objectives: all designs, and those on the front joined by a line.
+
+    Raises InputError for a path that cannot be written.
+    """
+    first, second = result.goals.names[:2]
+    designs, front = result.designs, result.designs[result.designs.front].sort_values(first)
+    scales = [scale_of(designs[name], result.units.get(name, "")) for name in (first, second)]
+    with page(*SIZE, path) as figure:
+        headline(figure, title or "Pareto front")
+        axes = figure.subplots()
+        for chosen, marker, colour, label in (
+            (designs[~designs.feasible], "x", PALE, "not feasible"),
+            (designs[designs.feasible & ~designs.front], ".", FAINT, "dominated"),
+        ):
+            x, y = (scale.factor * chosen[name] for scale, name in zip(scales, (first, second), strict=True))
+            axes.plot(x, y, marker, color=colour, label=label)
+        x, y = (scale.factor * front[name] for scale, name in zip(scales, (first, second), strict=True))
+        line = "-" if len(result.goals.names) == 2 else "none"
+        axes.plot(x, y, "o", linestyle=line, color=COLOURS[0], label=f"front, {len(front)} designs")
+        axes.set(xlabel=labelled(first, scales[0].unit), ylabel=labelled(second, scales[1].unit))
+        axes.legend()
+    return figure

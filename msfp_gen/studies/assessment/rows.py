@@ -1,9 +1,8 @@
-"""The rows of a study as a table of pandas: columns that evaluations take from it, and a quantity by random sample."""
+"""The rows of a study as a table of pandas, the columns that evaluations take from it, and what their figures share."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,11 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import write_columns
+from msfp_gen.figures.style import Scale, engineering
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.studies.study.chunks import parts_in, readable_parts, study_table
 
+SIZE = (6.8, 4.6)  # of a figure [inch]
 COMPLETE = "ok"  # the status of a run that reached its end
 STATISTICS: dict[str, Callable[..., Any]] = {
     "median": np.median,
@@ -40,9 +41,7 @@ def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
     checked = ds.ParquetFragmentScanOptions(page_checksum_verification=True)
     with readable_parts(folder):
         dataset = ds.dataset(parts, format=ds.ParquetFileFormat(default_fragment_scan_options=checked))
-    for name in columns or ():
-        if name not in dataset.schema.names:
-            raise unknown_column(name, dataset.schema.names)
+    check_columns(columns or (), dataset.schema.names)
     wanted = None if columns is None else list(dict.fromkeys(["run", "status", *columns]))
     with readable_parts(folder):
         rows = dataset.to_table(columns=wanted).to_pandas().sort_values("run", ignore_index=True)
@@ -57,8 +56,7 @@ def chosen_rows(rows: Any, conditions: Sequence[str]) -> Any:
         name, equals, value = text.partition("=")
         if not equals:
             raise InputError(f"{text!r}: give a column and a value, such as bounds=upper")
-        if name not in rows.columns:
-            raise unknown_column(name, list(rows.columns))
+        check_columns([name], rows.columns)
         column = rows[name]
         if column.dtype.kind == "f":
             try:
@@ -79,16 +77,24 @@ def write_frame(frame: Any, path: str | Path, name: str = "output") -> Path:
     return write_columns(path, {(column, ""): values.tolist() for column, values in columns}, name)
 
 
-def unknown_column(name: str, known: Sequence[str]) -> InputError:
-    """The error about a column that a study does not have."""
-    hint = suggestion(name, list(known)) or f"; the columns are {', '.join(known)}"
-    return InputError(f"{name}: no column of this study{hint}")
+def check_columns(names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise InputError for a column that a study does not have."""
+    known = list(known)
+    for name in names:
+        if name not in known:
+            hint = suggestion(name, known) or f"; the columns are {', '.join(known)}"
+            raise InputError(f"{name}: no column of this study{hint}")
+
+
+def check_share(name: str, value: float) -> None:
+    """Raise InputError for a level of confidence out of range."""
+    if not 0 < value < 1:
+        raise InputError(f"{name} = {value:g}: give a share between 0 and 1, such as 0.95")
 
 
 def numbers(rows: Any, name: str) -> Array:
     """A column as floats, shape (runs,) [its unit]; NaN: no value. Raises InputError: no such column, or texts."""
-    if name not in rows.columns:
-        raise unknown_column(name, list(rows.columns))
+    check_columns([name], rows.columns)
     try:
         return np.asarray(rows[name], dtype=float)
     except (TypeError, ValueError):
@@ -135,50 +141,9 @@ def labelled(name: str, unit: str) -> str:
     return name.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 
-@dataclass(frozen=True)
-class Samples:
-    """A quantity by sample.
-
-    Attributes:
-        name, unit: of the quantity.
-        statistic: over the runs of a sample.
-        axes: names of the random axes.
-        values: of the axes, ndarray, shape (samples, axes), [units of the axes].
-        reduced: the statistic of each sample, ndarray, shape (samples,), [its unit].
-        sampling: the table `[sampling]` of the study.
-    """
-
-    name: str
-    unit: str
-    statistic: str
-    axes: tuple[str, ...]
-    values: Array
-    reduced: Array
-    sampling: dict[str, Any]
-
-
-def by_sample(folder: str | Path, name: str, statistic: str, method: str) -> Samples:
-    """The quantity of a study by sample.
-
-    Raises InputError: another sampling method, runs that are missing or ended early, or a run without a value.
-    """
-    if statistic not in STATISTICS:
-        raise InputError(f"statistic = {statistic!r}: give one of {', '.join(STATISTICS)}")
-    table = study_table(Path(folder))
-    sampling = dict(table.get("sampling", {}))
-    if sampling.get("method", "latin-hypercube") != method:
-        raise InputError(f"{str(folder)!r}: this needs a study with sampling.method = {method!r}")
-    axes = tuple(axis for axis, keys in table["axes"].items() if "distribution" in keys)
-    rows = read_study(folder, [*axes, name])
-    if len(rows) < table["about"]["runs"]:
-        raise InputError(f"{str(folder)!r}: {len(rows)} of {table['about']['runs']} runs are done; complete the study")
-    if early := int((~complete(rows)).sum()):
-        raise InputError(f"{name}: {early} runs ended early; see their status and message, and narrow the axes")
-    y = numbers(rows, name)
-    if np.isnan(y).any():
-        raise InputError(f"{name}: {int(np.isnan(y).sum())} runs have no value; give another quantity")
-    count = table["about"]["samples"]
-    reduced = STATISTICS[statistic](y.reshape(-1, count), axis=0)
-    return Samples(
-        name, unit_of(rows, name), statistic, axes, rows[list(axes)].to_numpy(dtype=float)[:count], reduced, sampling
-    )
+def scale_of(values: Any, unit: str) -> Scale:
+    """Lengths in mm, other quantities with a prefix, plain numbers as they are."""
+    if unit == "m":
+        return Scale(1e3, "mm")
+    finite: Array = np.asarray(values, dtype=float)
+    return engineering(finite, unit) if unit else Scale(1.0, "")

@@ -4,14 +4,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.studies.assessment.rows import by_sample
+from msfp_gen.figures.style import COLOURS, INK, THIN, headline, page
+from msfp_gen.studies.assessment.rows import (
+    SIZE,
+    STATISTICS,
+    check_share,
+    complete,
+    labelled,
+    numbers,
+    read_study,
+    scale_of,
+    unit_of,
+)
 from msfp_gen.studies.pool import require
 from msfp_gen.studies.study.axes import Sampling
+from msfp_gen.studies.study.chunks import study_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -67,6 +84,55 @@ class Sobol:
     samples: int
 
 
+@dataclass(frozen=True)
+class Samples:
+    """A quantity by sample.
+
+    Attributes:
+        name, unit: of the quantity.
+        statistic: over the runs of a sample.
+        axes: names of the random axes.
+        values: of the axes, ndarray, shape (samples, axes), [units of the axes].
+        reduced: the statistic of each sample, ndarray, shape (samples,), [its unit].
+        sampling: the table `[sampling]` of the study.
+    """
+
+    name: str
+    unit: str
+    statistic: str
+    axes: tuple[str, ...]
+    values: Array
+    reduced: Array
+    sampling: dict[str, Any]
+
+
+def by_sample(folder: str | Path, name: str, statistic: str, method: str) -> Samples:
+    """The quantity of a study by sample.
+
+    Raises InputError: another sampling method, runs that are missing or ended early, or a run without a value.
+    """
+    if statistic not in STATISTICS:
+        raise InputError(f"statistic = {statistic!r}: give one of {', '.join(STATISTICS)}")
+    table = study_table(Path(folder))
+    sampling = dict(table.get("sampling", {}))
+    if sampling.get("method", "latin-hypercube") != method:
+        raise InputError(f"{str(folder)!r}: this needs a study with sampling.method = {method!r}")
+    axes = tuple(axis for axis, keys in table["axes"].items() if "distribution" in keys)
+    rows = read_study(folder, [*axes, name])
+    if len(rows) < table["about"]["runs"]:
+        raise InputError(f"{str(folder)!r}: {len(rows)} of {table['about']['runs']} runs are done; complete the study")
+    if early := int((~complete(rows)).sum()):
+        raise InputError(f"{name}: {early} runs ended early; see their status and message, and narrow the axes")
+    y = numbers(rows, name)
+    if np.isnan(y).any():
+        raise InputError(f"{name}: {int(np.isnan(y).sum())} runs have no value; give another quantity")
+    count = table["about"]["samples"]
+    reduced = STATISTICS[statistic](y.reshape(-1, count), axis=0)
+    return Samples(
+        name, unit_of(rows, name), statistic, axes, rows[list(axes)].to_numpy(dtype=float)[:count], reduced, sampling
+    )
+
+
 def tornado(folder: str | Path, name: str, statistic: str = "median") -> Tornado:
     """The change of a quantity with each random axis alone.
 
@@ -75,13 +141,10 @@ def tornado(folder: str | Path, name: str, statistic: str = "median") -> Tornado
     """
     samples = by_sample(folder, name, statistic, "one-at-a-time")
     low, high = samples.sampling.get("quantiles", Sampling("one-at-a-time").quantiles)
+    ends = [slice(1 + 2 * k, 3 + 2 * k) for k in range(len(samples.axes))]
     bars = [
-        Bar(
-            axis,
-            *(float(v) for v in samples.values[1 + 2 * k : 3 + 2 * k, k]),
-            *(float(v) for v in samples.reduced[1 + 2 * k : 3 + 2 * k]),
-        )
-        for k, axis in enumerate(samples.axes)
+        Bar(axis, *samples.values[two, k].tolist(), *samples.reduced[two].tolist())
+        for k, (axis, two) in enumerate(zip(samples.axes, ends, strict=True))
     ]
     bars.sort(key=lambda bar: -bar.swing)
     return Tornado(name, samples.unit, statistic, (low, high), float(samples.reduced[0]), tuple(bars))
@@ -96,8 +159,7 @@ def sobol(folder: str | Path, name: str, statistic: str = "median", level: float
     require("SALib", "salib", "Sobol' indices")
     from SALib.analyze import sobol as analysis
 
-    if not 0 < level < 1:
-        raise InputError(f"level = {level:g}: give a share between 0 and 1, such as 0.95")
+    check_share("level", level)
     samples = by_sample(folder, name, statistic, "sobol-indices")
     if not np.ptp(samples.reduced):
         raise InputError(f"{name}: it has the same value in all samples; give another quantity")
@@ -107,12 +169,11 @@ def sobol(folder: str | Path, name: str, statistic: str = "median", level: float
         problem, samples.reduced, calc_second_order=False, conf_level=level, print_to_console=False, seed=seed
     )
     order = np.argsort(-np.asarray(indices["ST"]), kind="stable")
-    columns = {key: tuple(float(indices[key][k]) for k in order) for key in ("S1", "ST", "S1_conf", "ST_conf")}
-    return Sobol(
-        name, samples.unit, statistic, tuple(samples.axes[k] for k in order),
-        columns["S1"], columns["ST"], columns["S1_conf"], columns["ST_conf"], level,
-        len(samples.reduced) // (count + 2),
-    )  # fmt: skip
+    first, total, of_first, of_total = (
+        tuple(indices[key][order].tolist()) for key in ("S1", "ST", "S1_conf", "ST_conf")
+    )
+    axes, base = tuple(samples.axes[k] for k in order), len(samples.reduced) // (count + 2)
+    return Sobol(name, samples.unit, statistic, axes, first, total, of_first, of_total, level, base)
 
 
 def tornado_table(result: Tornado) -> Table:
@@ -131,17 +192,62 @@ def tornado_table(result: Tornado) -> Table:
 
 def sobol_table(result: Sobol) -> Table:
     """The indices for a terminal."""
+    columns = (result.first, result.first_interval, result.total, result.total_interval)
     rows = [
-        (
-            axis,
-            f"{result.first[k]:.3f}",
-            f"± {result.first_interval[k]:.3f}",
-            f"{result.total[k]:.3f}",
-            f"± {result.total_interval[k]:.3f}",
-        )
-        for k, axis in enumerate(result.axes)
+        (axis, f"{first:.3f}", f"± {of_first:.3f}", f"{total:.3f}", f"± {of_total:.3f}")
+        for axis, first, of_first, total, of_total in zip(result.axes, *columns, strict=True)
     ]
     title = (
         f"Sobol' indices of the {result.statistic} of {result.name}, {result.samples} samples, {100 * result.level:g} %"
     )
     return Table(title, ("axis", "first order", "", "total", ""), rows)
+
+
+def plot_tornado(result: Tornado, path: str | Path | None = None, title: str = "") -> Figure:
+    """Bars of the quantity between the low and the high value of each axis, the longest on top.
+
+    Raises InputError for a path that cannot be written.
+    """
+    scale = scale_of([value for bar in result.bars for value in (bar.at_low, bar.at_high)], result.unit)
+    base = scale.factor * result.base
+    with page(SIZE[0], 1.4 + 0.45 * len(result.bars), path) as figure:
+        headline(figure, title or "sensitivity, one axis at a time")
+        axes = figure.subplots()
+        for place, bar in enumerate(reversed(result.bars)):
+            ends = ((bar.at_low, COLOURS[0], bar.low), (bar.at_high, COLOURS[1], bar.high))
+            for value, colour, at in ends:
+                end = scale.factor * value
+                axes.barh(place, end - base, left=base, height=0.6, color=colour)
+                side = "left" if end >= base else "right"
+                axes.annotate(f"{at:.3g}", (end, place), (3 if end >= base else -3, 0), textcoords="offset points",
+                              va="center", ha=side, fontsize=8)  # fmt: skip
+        axes.axvline(base, color=INK, linewidth=THIN)
+        axes.set_yticks(range(len(result.bars)), [labelled(bar.axis, "") for bar in reversed(result.bars)])
+        axes.margins(x=0.12)
+        axes.grid(visible=False, axis="y")
+        axes.set_xlabel(f"{result.statistic} of {labelled(result.name, scale.unit)}")
+    return figure
+
+
+def plot_sobol(result: Sobol, path: str | Path | None = None, title: str = "") -> Figure:
+    """First-order and total Sobol' indices of every axis with confidence intervals, the largest total on top.
+
+    Raises InputError for a path that cannot be written.
+    """
+    count = len(result.axes)
+    with page(SIZE[0], 1.6 + 0.5 * count, path) as figure:
+        headline(figure, title or f"Sobol' indices of {labelled(result.name, '')}")
+        axes = figure.subplots()
+        places = np.arange(count)[::-1]
+        drawn: list[tuple[str, Any, Any, float]] = [
+            ("first order", result.first, result.first_interval, 0.18),
+            ("total", result.total, result.total_interval, -0.18),
+        ]
+        for (label, values, errors, shift), colour in zip(drawn, COLOURS, strict=False):
+            axes.barh(places + shift, values, height=0.32, color=colour, label=label)
+            axes.errorbar(values, places + shift, xerr=errors, fmt="none", ecolor=INK, elinewidth=THIN, capsize=2)
+        axes.set_yticks(places, [labelled(name, "") for name in result.axes])
+        axes.grid(visible=False, axis="y")
+        axes.set_xlabel(f"share of the variance of the {result.statistic} of {labelled(result.name, '')}")
+        axes.legend(loc="lower right")
+    return figure

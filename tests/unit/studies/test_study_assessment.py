@@ -17,7 +17,7 @@ import msfp_gen
 from msfp_gen import InputError
 from msfp_gen.cli import main
 from msfp_gen.studies import fragility, ida, read_study, sobol, tornado
-from msfp_gen.studies.assessment import rows as rows_module
+from msfp_gen.studies.assessment import sensitivity
 from msfp_gen.studies.assessment.fragility import fragility_frame
 from msfp_gen.studies.assessment.rows import chosen_rows
 
@@ -242,7 +242,7 @@ def test_a_tornado_has_each_axis_alone(one_at_a_time: Path) -> None:
 
 def test_sensitivity_needs_its_sampling_and_all_runs(one_at_a_time: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"needs a study with sampling.method = 'sobol-indices'"):
-        rows_module.by_sample(one_at_a_time, "found", "median", "sobol-indices")
+        sensitivity.by_sample(one_at_a_time, "found", "median", "sobol-indices")
     with pytest.raises(InputError, match="statistic = 'mode': give one of median"):
         tornado(one_at_a_time, "found", "mode")
     table = cheap_study(sampling={"method": "one-at-a-time"}, chunk=2)
@@ -254,13 +254,12 @@ def test_sensitivity_needs_its_sampling_and_all_runs(one_at_a_time: Path, tmp_pa
 def test_sobol_indices_are_those_of_ishigami(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The rows of the sampling, in the order that SALib analyses; the function has known indices."""
     pytest.importorskip("SALib")
-    from msfp_gen.studies.assessment import sensitivity
     from msfp_gen.studies.study.axes import Sampling
 
     shares = Sampling("sobol-indices", 4096, seed=1).shares(3)
     x = np.pi * (2 * shares - 1)
     y = np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
-    given = rows_module.Samples("y", "", "median", ("a", "b", "c"), x, y, {})
+    given = sensitivity.Samples("y", "", "median", ("a", "b", "c"), x, y, {})
     monkeypatch.setattr(sensitivity, "by_sample", lambda *_: given)
     found = sobol(tmp_path, "y")
     assert found.axes == ("a", "b", "c") and found.samples == 4096
