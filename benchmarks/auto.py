@@ -23,10 +23,10 @@ import promises
 from quick import parser, pick
 
 from msfp_gen import Auto, Effects, RunError, Scene, load_scene, simulate
+from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import load_at_rest
 from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.scene.file.loader import scene_from_table
-from msfp_gen.simulation.result import Result
 
 ROWS = 4000
 TOLERANCE = 1e-6

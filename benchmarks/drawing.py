@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from reference.friction_circle import Push
 
-    from msfp_gen.simulation.result import Result
+    from msfp_gen.results.result import Result
 
 __all__ = [
     "COLOURS",

@@ -22,7 +22,7 @@ from quick import parser, pick
 
 from msfp_gen import Auto, Effects, Load, Motion, Scene, Top, presets, simulate
 from msfp_gen.generator import generate
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 from msfp_gen.specification.friction_laws import HEAT_KERNEL
 from msfp_gen.specification.layout import ModelSpec
 

@@ -16,9 +16,9 @@ from results_page import TABLE_42
 from scipy.optimize import least_squares
 
 from msfp_gen import Scene, load_scene, simulate
-from msfp_gen.analysis.summary import RIMS, STOPS, stopping_displacement, transitions
 from msfp_gen.common.arrays import Array
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
+from msfp_gen.results.summary import RIMS, STOPS, stopping_displacement, transitions
 from msfp_gen.studies.calibration.intervals import Noise, identified, spread_of, weak
 
 LOAD = 112e3  # axial load of the preset [N]

@@ -14,7 +14,7 @@ from plain import plain_scene
 from quick import parser, pick
 
 from msfp_gen import Scene, simulate
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 SCENES = pick(("fenz-test2", "fenz-test5", "becker-eight-125", "ridgecrest-clc"), ("fenz-test2",))
 REPEATS = pick(12, 1)

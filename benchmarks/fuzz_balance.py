@@ -21,9 +21,9 @@ from reference.kinematics import E, cross
 
 from msfp_gen import Effects, Rotation, RunError, Scene, Top, simulate
 from msfp_gen.results.history import History
+from msfp_gen.results.result import Result
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, is_sprung
-from msfp_gen.simulation.result import Result
 from msfp_gen.simulation.simulate import RunSequence
 
 Array = Any

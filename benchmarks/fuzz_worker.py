@@ -20,8 +20,8 @@ from fuzz_second import Second
 from quick import parser
 
 from msfp_gen import InputError, RunError, Scene, simulate
+from msfp_gen.results.result import Result
 from msfp_gen.scene.top import MassTop
-from msfp_gen.simulation.result import Result
 
 MEMORY = 4 << 30  # memory limit [bytes]; a run that needs more ends with a named failure
 ROWS = 8  # rows of a run that the second method repeats

@@ -10,7 +10,7 @@ from drawing import COLOURS, MILLI, drawn, panels, ratio
 from quick import docs_folder, parser
 
 from msfp_gen import Scene, load_scene, simulate
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 from msfp_gen.specification.friction_laws import law_parameter_names
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -23,8 +23,8 @@ from quick import docs_folder, parser, pick
 
 from msfp_gen import RunError, Scene, Top, presets, simulate
 from msfp_gen.common.output import replacing
+from msfp_gen.results.result import Result
 from msfp_gen.scene.scene_fields import Stop
-from msfp_gen.simulation.result import Result
 
 WEIGHT = 9.24 * 9.81  # W [N] of PEER 2017/07, bodies 2..5
 LARGEST, TESTED, U_MAX = 1e6, 112e3, 0.140  # N_max [N], N of table 4.1 [N], [m]

@@ -40,7 +40,6 @@ UNIT, RUNS = "tests/unit", "tests/physics"
 TESTS = pick(
     (
         (f"{RUNS}/test_friction_laws.py", f"{RUNS}/test_hysteresis.py"),
-        (f"{UNIT}/analysis",),
         (f"{UNIT}/simulation",),
         (f"{UNIT}/buildings",),
         (f"{RUNS}/test_gradients.py", f"{RUNS}/test_gradients_free.py"),
@@ -72,7 +71,6 @@ PYTHON = {
             "model",
             "simulation",
             "results",
-            "analysis",
             "buildings",
         )
     },

@@ -22,7 +22,7 @@ from drawing import COLOURS, FAINT, INK, MILLI, Runs, closed_form, cycle, drawn,
 
 from msfp_gen import presets, simulate  # noqa: E402
 from msfp_gen.figures import plot_result  # noqa: E402
-from msfp_gen.simulation.result import Result  # noqa: E402
+from msfp_gen.results.result import Result  # noqa: E402
 
 MARKS = {"u_star": "u*", "u_star_star": "u**", "u_dr1": "u_dr1", "u_dr4": "u_dr4"}
 TESTS = tuple(f"fenz-test{number}" for number in range(1, 6))

@@ -10,11 +10,11 @@ from drawing import MILLI, Runs, closed_form, closed_push, cycle, ratio
 from inertia_study import GRID, RTOL, SERIES, TESTED, Point, failures, scene
 
 from msfp_gen import simulate
-from msfp_gen.analysis import summary as stops
 from msfp_gen.common.output import replacing
 from msfp_gen.common.tables import markdown_table
+from msfp_gen.results import summary as stops
+from msfp_gen.results.result import Result
 from msfp_gen.results.sliding import SHARE
-from msfp_gen.simulation.result import Result
 
 # Table 4.2 as printed: analytical, experiment, model of PEER 2017/07. u in [mm], F over N.
 TABLE_42 = {

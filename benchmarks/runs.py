@@ -17,7 +17,7 @@ from plain import plain_scene
 from quick import installed, parser, pick
 
 from msfp_gen import Effects, Scene, simulate
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 from msfp_gen.studies.accuracy.series import run_opensees
 
 Array = NDArray[np.float64]

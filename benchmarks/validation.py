@@ -45,8 +45,8 @@ from msfp_gen import (  # noqa: E402
 )
 from msfp_gen.common.output import replacing  # noqa: E402
 from msfp_gen.common.tables import markdown_table  # noqa: E402
+from msfp_gen.results.result import Result  # noqa: E402
 from msfp_gen.scene.friction_parameters import coefficient  # noqa: E402
-from msfp_gen.simulation.result import Result  # noqa: E402
 from msfp_gen.specification.friction_laws import BUILT_IN  # noqa: E402
 from msfp_gen.studies.accuracy.series import run_opensees  # noqa: E402
 

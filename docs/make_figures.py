@@ -17,7 +17,7 @@ from msfp_gen.figures import style
 from msfp_gen.motions.records import baseline_corrected, bundled, response_spectrum
 from msfp_gen.results.geometry import sections
 from msfp_gen.results.joining import at_times
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 from msfp_gen.studies import fragility, ida, plot_fragility, plot_ida, read_study
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))

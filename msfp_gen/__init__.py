@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from msfp_gen.common.version import __version__
 
 if TYPE_CHECKING:
-    from msfp_gen.analysis.any_result import characterise as characterise
     from msfp_gen.buildings.building import Building as Building
     from msfp_gen.buildings.file import changed_scene as changed_scene
     from msfp_gen.buildings.file import load_scene as load_scene
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion as Motion
     from msfp_gen.motions.prescribed import Load as Load
     from msfp_gen.motions.prescribed import Rotation as Rotation
+    from msfp_gen.results.result import Result as Result
+    from msfp_gen.results.result import characterise as characterise
     from msfp_gen.scene.bearing import Bearing as Bearing
     from msfp_gen.scene.bearing import Body as Body
     from msfp_gen.scene.bearing import Surface as Surface
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene_fields import Stop as Stop
     from msfp_gen.scene.solver import Solver as Solver
     from msfp_gen.scene.top import Top as Top
-    from msfp_gen.simulation.result import Result as Result
     from msfp_gen.simulation.simulate import simulate as simulate
     from msfp_gen.specification.layout import Auto as Auto
     from msfp_gen.specification.layout import Effects as Effects
@@ -69,7 +69,7 @@ _MODULES = {
     "Measurement": "studies.calibration",
     "Motion": "motions.motion",
     "MsfpError": "common.errors",
-    "Result": "simulation.result",
+    "Result": "results.result",
     "Rotation": "motions.prescribed",
     "RunError": "common.errors",
     "Scene": "scene.scene",
@@ -83,7 +83,7 @@ _MODULES = {
     "bound": "studies.bounding",
     "build_model": "model.model",
     "changed_scene": "buildings.file",
-    "characterise": "analysis.any_result",
+    "characterise": "results.result",
     "fit": "studies.calibration",
     "load_scene": "buildings.file",
     "presets": "scene.file.presets",

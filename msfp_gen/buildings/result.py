@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from msfp_gen.analysis.any_result import AnyResult, Curve, OneBearing, Rows
-from msfp_gen.analysis.summary import summary_of_bearing, time_row
 from msfp_gen.buildings import dataset as building_dataset
 from msfp_gen.buildings import summary as summaries
 from msfp_gen.buildings.extremes import CONTACT, OF_SURFACES, BuildingExtremes, corners, heated, overturning
@@ -17,12 +15,13 @@ from msfp_gen.buildings.notes import notes_of
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.summary import BuildingCharacterisation
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
 from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.files import KINDS, Storage
+from msfp_gen.results.files import Storage
 from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Event
 from msfp_gen.results.note import Note
+from msfp_gen.results.result import AnyResult, Curve, OneBearing, Rows
+from msfp_gen.results.summary import summary_of_bearing, time_row
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,6 +52,7 @@ class BuildingResult(AnyResult):
     """
 
     source: ClassVar[str] = "msfp-gen building"
+    storage: ClassVar[Storage] = building_dataset
     scene: BuildingScene
     time: Array
     displacement: Array
@@ -262,11 +262,6 @@ class BuildingResult(AnyResult):
         """
         return BuildingCharacterisation.of(self)
 
-    @classmethod
-    def storage(cls) -> Storage:
-        """The functions of `buildings/dataset.py`."""
-        return building_dataset
-
 
 def _squares(rows: Array, matrix: Array) -> Array:
     """x^T A x of every row x, shape (k,)."""
@@ -421,11 +416,6 @@ class BearingResult(OneBearing):
             *super().main_results(),
             ("N over N at rest", f"{s['minimum_load_ratio']:.2f} to {s['maximum_load_ratio']:.2f}"),
         ]
-
-    @classmethod
-    def storage(cls) -> Storage:
-        """It has none of its own: the file of the building is read."""
-        raise InputError(f"this is the result of {KINDS[cls.source]}")
 
     def derived_and_groups(self) -> tuple[tuple[str, ...], dict[str, xr.Dataset]]:
         """Its file has only the dataset, for other programs."""

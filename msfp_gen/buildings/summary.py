@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from msfp_gen.analysis.characterise import Characterisation, characterised, effective_period
-from msfp_gen.analysis.loops import ForcePath, rests
-from msfp_gen.analysis.summary import summary_of_run
 from msfp_gen.common.tables import Table, yes
+from msfp_gen.results.characterise import Characterisation, characterised, effective_period
 from msfp_gen.results.extremes import by_axis
+from msfp_gen.results.loops import ForcePath, rests
+from msfp_gen.results.summary import summary_of_run
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.building import Building

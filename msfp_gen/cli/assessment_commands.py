@@ -46,8 +46,8 @@ def characterise(
     as_json: AsJson = False,
 ) -> None:
     """Effective stiffness, damping, sliding regimes, capacity left, velocity and heat of a run, with envelopes."""
-    from msfp_gen.analysis.characterise import CSV_SUFFIXES, write_csv
     from msfp_gen.common.output import check_output
+    from msfp_gen.results.characterise import CSV_SUFFIXES, write_csv
 
     if output is not None:
         check_output(output, CSV_SUFFIXES, "--output")

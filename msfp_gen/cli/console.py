@@ -24,11 +24,11 @@ from msfp_gen.results.sign import SIGNS
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
-    from msfp_gen.analysis.verdict import Verdict
     from msfp_gen.buildings.file import AnyScene
     from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.common.tables import Table
-    from msfp_gen.simulation.result import Result
+    from msfp_gen.results.result import Result
+    from msfp_gen.results.verdict import Verdict
 
     AnyResult = Result | BuildingResult
 
@@ -223,7 +223,7 @@ def load_source(source: str) -> AnyResult | AnyScene:
     if source.lower().endswith(".nc"):
         from msfp_gen.buildings.result import BuildingResult
         from msfp_gen.results.files import read_result
-        from msfp_gen.simulation.result import Result
+        from msfp_gen.results.result import Result
 
         result: Any = read_result(source, Result, BuildingResult)
         return result  # type: ignore[no-any-return]

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.analysis.summary import SYMBOLS, is_monotonic, transitions
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures.section import draw_circles, draw_section, peak_time
 from msfp_gen.figures.style import (
@@ -41,6 +40,7 @@ from msfp_gen.results.geometry import friction_circles, poses, sections, slider_
 from msfp_gen.results.joining import at_times
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.results.sliding import intervals, rims_in_contact, separated, sliding_surfaces
+from msfp_gen.results.summary import SYMBOLS, is_monotonic, transitions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

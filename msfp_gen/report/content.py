@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from msfp_gen.analysis.any_result import AnyResult
     from msfp_gen.results.history import Event
+    from msfp_gen.results.result import AnyResult
     from msfp_gen.scene.bearing import Bearing
 
 MILLI, KILO = 1e3, 1e-3

@@ -27,7 +27,7 @@ from msfp_gen.model.model import Model
 from msfp_gen.report.content import script_data
 from msfp_gen.report.frames import pieces
 from msfp_gen.scene.top import RigTop
-from msfp_gen.simulation.segment import start_run
+from msfp_gen.simulation.start import start_run
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import Effects, ModelSpec
 
@@ -108,7 +108,7 @@ def problem_of(scene: Scene, title: str) -> Problem:
 
 def fixed_scene(scene: Scene) -> Scene:
     """The scene with the effects at its start, and rims. Raises InputError where the page cannot run it."""
-    from msfp_gen.simulation.settling import needs_settling
+    from msfp_gen.simulation.start import needs_settling
 
     selection = scene.effect_selection
     refused = {

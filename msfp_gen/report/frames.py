@@ -19,8 +19,8 @@ from msfp_gen.results.sliding import separated, sliding_surfaces
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult
+    from msfp_gen.results.result import Result
     from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.simulation.result import Result
 
 FRAMES = 1500  # instants; 0.5 kB each for a triple pendulum, and more than a screen has pixel columns
 FEWEST = 600  # least number of instants, so that the motion looks continuous

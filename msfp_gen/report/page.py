@@ -35,7 +35,7 @@ from msfp_gen.studies.calibration.fit_result import correlation_table, estimate_
 from msfp_gen.studies.calibration.intervals import lag_one
 
 if TYPE_CHECKING:
-    from msfp_gen.simulation.result import Result
+    from msfp_gen.results.result import Result
     from msfp_gen.studies.calibration import Estimate, Fit, FittedTest
 
 NO_TITLE = TitleBlock()

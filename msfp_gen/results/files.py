@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
@@ -77,27 +76,24 @@ class Storage(Protocol):
         """
 
 
-class ResultFiles(ABC):
+class ResultFiles:
     """The files of a result, and the identity of its scene.
 
-    source: the attribute of a file by which its kind of result is known.
+    source: the attribute of a file by which its kind of result is known. storage: what makes its dataset, and reads its
+    files; a bearing of a building has none.
     """
 
     source: ClassVar[str]
-
-    @classmethod
-    @abstractmethod
-    def storage(cls) -> Storage:
-        """What makes the dataset of its kind of result, and reads its files."""
+    storage: ClassVar[Storage]
 
     @cached_property
     def dataset(self) -> xr.Dataset:
         """Rows, and events, as an xarray.Dataset, with units, meanings and signs in attributes; built at first use."""
-        return self.storage().to_dataset(self)
+        return self.storage.to_dataset(self)
 
     def derived_and_groups(self) -> tuple[Collection[str], dict[str, xr.Dataset]]:
         """Variables of the dataset that follow from the others, and the groups of the netCDF-4 file beside it."""
-        return self.storage().DERIVED, self.storage().groups_of(self)
+        return self.storage.DERIVED, self.storage.groups_of(self)
 
     if TYPE_CHECKING:  # fields of the subclasses, or properties
 
@@ -419,14 +415,14 @@ def read_result(path: str | Path, *kinds: type[F]) -> F:
 def _result_in(root: StoredGroup, kinds: Sequence[type[F]]) -> F:
     about = root.attributes(lambda name: name in ("source", DIGEST, EDITION) or _is_read(name))
     source, edition = about.pop("source", None), about.pop(EDITION, None)
-    kind = next((kind for kind in kinds if kind.source == source), None)
+    kind = next((kind for kind in kinds if kind.source == source and hasattr(kind, "storage")), None)
     if kind is None:
         what = f"this is the result of {KINDS[str(source)]}" if source in KINDS else f"no result of msfp-gen; {REMEDY}"
         raise InputError(what)
     try:
         return _read(root, about, kind)
     except (InputError, *DAMAGE) as error:
-        if edition != kind.storage().edition():
+        if edition != kind.storage.edition():
             raise InputError(
                 "another version of msfp-gen wrote this result, which this one cannot read; run its scene again "
                 "(attribute scene)"
@@ -438,7 +434,7 @@ def _read(root: StoredGroup, about: dict[str, Attribute], kind: type[F]) -> F:
     if not all(isinstance(about.get(name), str) for name in WORDS):
         raise ValueError(f"an attribute of {', '.join(WORDS)} is no text")
     written, arrays = about.pop(DIGEST, None), dict[str, Any]()
-    fields = kind.storage().fields_in(root, about, arrays)
+    fields = kind.storage.fields_in(root, about, arrays)
     if not str(about["status"]).isidentifier():
         raise ValueError(f"status = {about['status']!r} is no word")
     if written is not None and written != digest_of(about, arrays):  # another program may have left it out

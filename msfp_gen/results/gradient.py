@@ -8,21 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.model.plane import out_of_plane
 from msfp_gen.results.extremes import LEAST, Extremes
 from msfp_gen.results.history import ENERGY
-from msfp_gen.results.row_unpacking import unpacked
 
 if TYPE_CHECKING:
-    from msfp_gen.model.compiled import Run
-    from msfp_gen.model.model import Model
     from msfp_gen.results.history import History
     from msfp_gen.scene.parameters import Parameter
 
 ENERGIES = ("kinetic", "potential", "restraint", "rim_stored", "seat_stored")  # of the state; the others are integrals
 ERROR = "_error"  # ends the name of the variable with the error of a derivative
 EVENTS = ("event_time", "event_displacement", "event_top_force")  # fields
-EVENT = 7  # numbers of an event: time, displacement, top force
 
 
 def energy_terms(integrals: bool, uplift: bool) -> tuple[str, ...]:
@@ -52,43 +47,6 @@ class Gradients:
     arrays: dict[str, Array]
     extremes: tuple[Extremes, ...]
     error: Gradients | None = None
-
-    @classmethod
-    def of_run(
-        cls,
-        parameters: tuple[Parameter, ...],
-        energies: tuple[str, ...],
-        model: Model,
-        run: Run,
-        count: int,
-        azimuth: float,
-        sprung: bool,
-    ) -> Gradients:
-        """The derivatives of a compiled run that has ended. count: number of its rows that are kept.
-
-        energies: of `energy_terms`.
-        """
-        rows, events = run.gradient_rows(len(parameters))[:count], run.gradient_events(len(parameters))
-        by_parameter = [unpacked(model, rows[:, i], azimuth, sprung) for i in range(len(parameters))]
-        constant = {"time", "energy"} | (set() if model.effects.uplift else {"lift", "separation"})
-        names = [name for name, values in by_parameter[0].items() if name not in constant and values is not None]
-        if model.effects.uplift:
-            is_open = model.unpack(run.rows[:count])["compression"] < 0
-            for values, slopes in zip(by_parameter, np.moveaxis(rows, 1, 0), strict=True):
-                values["lift"] = np.where(is_open, -model.unpack(slopes)["compression"], 0.0)
-        vectors = (out_of_plane(events[:, :, 1 + 3 * i : 4 + 3 * i], azimuth, "vector") for i in range(2))
-        displacement, force = (np.moveaxis(vector, 1, 0) for vector in vectors)
-        arrays = {name: np.array([values[name] for values in by_parameter]) for name in names}
-        arrays |= {f"energy_{name}": np.array([values["energy"][name] for values in by_parameter]) for name in energies}
-        arrays |= dict(zip(EVENTS, (events[:, :, 0].T, displacement, force), strict=True))
-        return cls(
-            parameters,
-            arrays,
-            tuple(
-                Extremes.of_run(model.extension.EXTREMES, numbers, azimuth)
-                for numbers in run.gradient_extremes(len(parameters))
-            ),
-        )
 
     def largest_numbers(self) -> Array:
         """Largest magnitude of all derivatives by each parameter, shape (k,) [SI]; not finite if one is not."""

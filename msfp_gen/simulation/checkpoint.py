@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import check_folder, clear_leftovers, write_bytes
-from msfp_gen.simulation.row_file import RowFile, rows_beside
+from msfp_gen.simulation.rows import RowFile, rows_beside
 
 if TYPE_CHECKING:
     from msfp_gen.model.model import Model

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import pi
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.model.evaluation import bodies_and_surfaces, settlements, top_values
-from msfp_gen.model.plane import motion_in_plane, wrench_in_plane
+from msfp_gen.model.plane import motion_in_plane, out_of_plane, wrench_in_plane
 from msfp_gen.motions.time_grid import snapped
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.gradient import EVENTS, Gradients, energy_terms, gradients_of_extremes
@@ -25,8 +25,8 @@ from msfp_gen.scene.friction_parameters import derived_slopes, law_parameters
 from msfp_gen.scene.parameters import Parameter, parameters_of
 from msfp_gen.scene.standing import SPRINGS, stiffness_slopes
 from msfp_gen.scene.top import is_sprung, load_values
-from msfp_gen.simulation.segment import Frame, first_load, state_in_plane, time_grid, wrench_pieces
-from msfp_gen.simulation.settling import needs_settling
+from msfp_gen.simulation.rows import unpacked
+from msfp_gen.simulation.start import Frame, first_load, needs_settling, state_in_plane, time_grid, wrench_pieces
 from msfp_gen.specification import contract
 
 if TYPE_CHECKING:
@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from msfp_gen.model.model import Model
     from msfp_gen.motions.motion import Motion
     from msfp_gen.results.history import Event
+    from msfp_gen.results.result import Result
     from msfp_gen.scene.scene import Scene
-    from msfp_gen.simulation.result import Result
-    from msfp_gen.simulation.segment import Segment
-    from msfp_gen.simulation.settling import StartSlopes
+    from msfp_gen.simulation.rows import Segment
+    from msfp_gen.simulation.start import StartSlopes
     from msfp_gen.specification.layout import Effects
 
 _STATE = ("q", "v", "h")
@@ -262,15 +262,6 @@ CONTACT_IN_LONG_STEP = (
 )
 
 
-class RunParts(Protocol):
-    """What is needed of a run that has ended: its scene, the parameters of its derivatives and its segments."""
-
-    scene: Scene
-    parameters: tuple[Parameter, ...]
-    energies: bool
-    segments: list[Segment]
-
-
 def gradient_parameters(
     scene: Scene, paths: Sequence[str], checkpoint: object = None, stream: object = None, energies: bool = False
 ) -> tuple[Parameter, ...]:
@@ -309,26 +300,54 @@ def switching_error(segment: Segment, notes: Sequence[Note]) -> InputError:
     )
 
 
-def run_gradients(sequence: RunParts, rows: int, events: Sequence[Event]) -> Gradients | None:
-    """The derivatives that a run computed; None without parameters. rows: number of its rows that are kept.
+def run_gradients(
+    scene: Scene,
+    segment: Segment,
+    parameters: tuple[Parameter, ...],
+    energies: bool,
+    rows: int,
+    events: Sequence[Event],
+) -> Gradients:
+    """The derivatives that a run computed. rows: number of its rows that are kept. events: of the run.
 
-    events: of the run. Raises InputError where undamped ringing was resolved: the response is chaotic, and a derivative
-    has no meaning; and for energies through a rim contact in quasi-static steps, see `CONTACT_IN_LONG_STEP`.
+    energies: whether those that are integrals over the run are differentiated. Raises InputError where undamped ringing
+    was resolved: the response is chaotic, and a derivative has no meaning; and for energies through a rim contact in
+    quasi-static steps, see `CONTACT_IN_LONG_STEP`.
     """
-    if not sequence.parameters:
-        return None
-    scene, segment = sequence.scene, sequence.segments[-1]
-    azimuth, sprung = segment.azimuth, is_sprung(scene.top)
-    if sequence.energies and events and quasistatic(scene, segment.model.effects):
+    effects = segment.model.effects
+    if energies and events and quasistatic(scene, effects):
         raise InputError(CONTACT_IN_LONG_STEP.format(time=events[0].time, surface=events[0].surface))
-    energies = energy_terms(sequence.energies, segment.model.effects.uplift)
-    gradients = Gradients.of_run(sequence.parameters, energies, segment.model, segment.run, rows, azimuth, sprung)
-    steps, undamped = segment.run.counts["steps"], undamped_surfaces(scene, segment.model.effects)
+    terms = energy_terms(energies, effects.uplift)
+    gradients = _computed(segment, parameters, terms, rows, is_sprung(scene.top))
+    steps, undamped = segment.run.counts["steps"], undamped_surfaces(scene, effects)
     resolved = undamped and segment.run.time < steps * RESOLVED_SHARE * slider_period(scene)
-    for parameter, size in zip(gradients.parameters, gradients.largest_numbers(), strict=True):
+    for parameter, size in zip(parameters, gradients.largest_numbers(), strict=True):
         if resolved or not np.isfinite(size):
             raise InputError(f"gradients = {parameter.path!r}: {RINGING}")
     return gradients
+
+
+def _computed(
+    segment: Segment, parameters: tuple[Parameter, ...], energies: Sequence[str], count: int, sprung: bool
+) -> Gradients:
+    """The derivatives of a segment. energies: of `energy_terms`. count: number of its rows that are kept."""
+    model, run, azimuth = segment.model, segment.run, segment.azimuth
+    rows, events = run.gradient_rows(len(parameters))[:count], run.gradient_events(len(parameters))
+    by_parameter = [unpacked(model, rows[:, i], azimuth, sprung) for i in range(len(parameters))]
+    constant = {"time", "energy"} | (set() if model.effects.uplift else {"lift", "separation"})
+    names = [name for name, values in by_parameter[0].items() if name not in constant and values is not None]
+    if model.effects.uplift:
+        is_open = model.unpack(run.rows[:count])["compression"] < 0
+        for values, slopes in zip(by_parameter, np.moveaxis(rows, 1, 0), strict=True):
+            values["lift"] = np.where(is_open, -model.unpack(slopes)["compression"], 0.0)
+    vectors = (out_of_plane(events[:, :, 1 + 3 * i : 4 + 3 * i], azimuth, "vector") for i in range(2))
+    displacement, force = (np.moveaxis(vector, 1, 0) for vector in vectors)
+    arrays = {name: np.array([values[name] for values in by_parameter]) for name in names}
+    arrays |= {f"energy_{name}": np.array([values["energy"][name] for values in by_parameter]) for name in energies}
+    arrays |= dict(zip(EVENTS, (events[:, :, 0].T, displacement, force), strict=True))
+    recorded = run.gradient_extremes(len(parameters))
+    extremes = tuple(Extremes.of_run(model.extension.EXTREMES, numbers, azimuth) for numbers in recorded)
+    return Gradients(parameters, arrays, extremes)
 
 
 def with_gradient_errors(result: Result, run: Callable[[Scene], Result]) -> Result:
@@ -367,17 +386,14 @@ def undamped_surfaces(scene: Scene, effects: Effects) -> list[int]:
     return [i for i, surface in enumerate(scene.bearing.surfaces, 1) if surface.contact_damping == 0]
 
 
-def gradient_notes(sequence: RunParts, events: Sequence[Event]) -> tuple[Note, ...]:
+def gradient_notes(scene: Scene, effects: Effects, events: Sequence[Event]) -> tuple[Note, ...]:
     """A note where sliders of a run with gradients ring undamped, or ring after a rim contact. events: of the run."""
-    if not sequence.parameters:
-        return ()
-    effects = sequence.segments[-1].model.effects
-    undamped = undamped_surfaces(sequence.scene, effects)[:1]
+    undamped = undamped_surfaces(scene, effects)[:1]
     if undamped:
         return tuple(Note(0.0, "ringing", surface, 0.0, UNDAMPED.format(surface=surface)) for surface in undamped)
     contact = next((event for event in events if event.kind == "rim_contact"), None)
-    damping = min(surface.contact_damping for surface in sequence.scene.bearing.surfaces)
-    critical = slider_period(sequence.scene) / pi  # T omega/2 = 1
+    damping = min(surface.contact_damping for surface in scene.bearing.surfaces)
+    critical = slider_period(scene) / pi  # T omega/2 = 1
     if contact is None or effects.sliders == "massless" or damping >= critical:
         return ()
     advised = max(1e-3, 1.2 * critical)

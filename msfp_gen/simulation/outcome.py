@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from msfp_gen.results.history import Event, History
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
-    from msfp_gen.simulation.segment import Segment
+    from msfp_gen.simulation.rows import Segment
     from msfp_gen.specification.layout import Effects
 
 Progress = Callable[[float, float], None]  # called with the time reached and the end of the run [s]

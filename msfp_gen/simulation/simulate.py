@@ -13,9 +13,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from msfp_gen.buildings.compiled_run import BuildingRun
-from msfp_gen.buildings.compiled_run import result_of as building_result
-from msfp_gen.buildings.compiled_run import start_run as start_building
 from msfp_gen.buildings.dataset import scene_text
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.errors import InputError, RunError
@@ -25,12 +22,14 @@ from msfp_gen.model.model import build_model
 from msfp_gen.results.history import Counters, History
 from msfp_gen.results.joining import joined, thinned_history
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
-from msfp_gen.results.restart_state import RestartState
-from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of
+from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_switching import check, next_effects, stopping_monitors
 from msfp_gen.scene.file.loader import dumps
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import is_sprung
+from msfp_gen.simulation.building_run import BuildingRun
+from msfp_gen.simulation.building_run import result_of as building_result
+from msfp_gen.simulation.building_run import start_run as start_building
 from msfp_gen.simulation.checkpoint import (
     EVERY,
     Checkpoint,
@@ -59,18 +58,26 @@ from msfp_gen.simulation.outcome import (
     provenance_of,
     stopped,
 )
-from msfp_gen.simulation.result import Result
-from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
-from msfp_gen.simulation.segment import Segment, start_run, start_temperatures
-from msfp_gen.simulation.settling import (
+from msfp_gen.simulation.restart_state import RestartState
+from msfp_gen.simulation.rows import (
+    ROWS_HELD,
+    RowFile,
+    Segment,
+    StreamedRows,
+    events_of,
+    finite_rows,
+    history_of,
+    start_temperatures,
+)
+from msfp_gen.simulation.start import (
     StartSlopes,
     moves_settling,
     needs_settling,
     settling_scene,
+    start_run,
     start_slopes,
     state_at_rest,
 )
-from msfp_gen.simulation.streamed_rows import StreamedRows
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult
@@ -393,7 +400,7 @@ def _advance(
 
 
 def _result(sequence: RunSequence, history: History) -> Result:
-    scene, segments, last = sequence.scene, sequence.segments, sequence.segments[-1]
+    scene, segments, parameters, last = sequence.scene, sequence.segments, sequence.parameters, sequence.segments[-1]
     counts = [{k: int(n) for k, n in segment.run.counts.items()} for segment in segments]
     total = Counters(**{name: sum(count[name] for count in counts) for name in counts[0]})
     events = tuple(event for s in segments for event in events_of(s.model, s.run, s.azimuth))
@@ -409,9 +416,11 @@ def _result(sequence: RunSequence, history: History) -> Result:
         notes=tuple(sequence.notes)
         + history_notes(scene, last.model.effects, thinned_history(history))
         + landing_notes(events)
-        + gradient_notes(sequence, events),
+        + (gradient_notes(scene, last.model.effects, events) if parameters else ()),
         recorded_extremes=extremes_of(segments),
-        gradients=run_gradients(sequence, len(history.time), events),
+        gradients=run_gradients(scene, last, parameters, sequence.energies, len(history.time), events)
+        if parameters
+        else None,
     )
 
 

@@ -337,7 +337,7 @@ class _Reader:
 
     def __init__(self, result: Any, keep: Keep) -> None:
         self.result = result
-        self._storage: Storage = result.storage()
+        self._storage: Storage = result.storage
         self.problem = ""
         self._keep = keep
         self._known = keep.known

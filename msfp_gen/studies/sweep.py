@@ -21,8 +21,8 @@ from msfp_gen.studies.study.axes import Axis, Recipe, SceneFactory, located, mot
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult
+    from msfp_gen.results.result import Result
     from msfp_gen.scene.file.loader import SuiteRecord
-    from msfp_gen.simulation.result import Result
 
 MAX_SCENES = 100_000  # of one sweep; more are taken to be a typing error
 WIDTH = 80  # columns of a terminal

@@ -23,7 +23,7 @@ from msfp_gen import InputError, RunError, Scene, changed_scene, load_scene, sim
 from msfp_gen.cli import main
 from msfp_gen.cli.console import signals_as_interrupts
 from msfp_gen.motions import records
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 from msfp_gen.studies import batch
 from msfp_gen.studies.batch import completed_runs
 from msfp_gen.studies.sweep import row_of, sweep_table, variations, varied_field, write_table

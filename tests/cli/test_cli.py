@@ -16,7 +16,7 @@ from msfp_gen.cli.console import Progress
 from msfp_gen.cli.run_commands import DEMO
 from msfp_gen.common.errors import CompileError, RunError
 from msfp_gen.jit.build import BuildInfo
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 
 @pytest.fixture

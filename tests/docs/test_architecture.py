@@ -20,7 +20,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *s
 # The packages and the modules beside them, lowest first: each imports only itself and what stands before it.
 ORDER = (
     "common", "specification", "generator", "templates", "runtime", "jit", "motions", "scene",
-    "model", "embedding", "results", "analysis", "buildings", "figures", "simulation",
+    "model", "embedding", "results", "buildings", "figures", "simulation",
     "studies", "report", "", "cli", "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
 

@@ -11,7 +11,7 @@ import pytest
 from support import ROOT
 
 from msfp_gen import Limits, load_scene
-from msfp_gen.analysis.verdict import LIMITS
+from msfp_gen.results.verdict import LIMITS
 
 sys.path.append(str(ROOT / "benchmarks"))
 import limits

@@ -13,7 +13,7 @@ import report_figures
 import results_page
 
 from msfp_gen import presets, simulate
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 PNG = b"\x89PNG"
 LIGHTEST = np.array([1e6, 10.0])

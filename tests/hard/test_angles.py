@@ -21,8 +21,8 @@ from support.stacks import (
 )
 
 from msfp_gen import Bearing, Effects, Motion, Scene, Solver, Top, simulate
+from msfp_gen.results.result import Result
 from msfp_gen.scene.scene_fields import InitialState
-from msfp_gen.simulation.result import Result
 
 TINY = [1e-3, 1e-6, 1e-8, 1e-9, 1e-12]
 TFP = (5, 2, 2)

@@ -23,7 +23,7 @@ from support.stacks import (
 )
 
 from msfp_gen import Motion, Scene, Solver, presets, simulate
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 TFP, RADII, FRICTION = (5, 2, 2), [1.0, 0.3, 0.3, 1.0], [0.03, 0.015, 0.015, 0.1]
 TRAVEL = [0.2, 0.06, 0.06, 0.2]

@@ -19,7 +19,7 @@ from support import ROOT, failure_of
 from support.stacks import a_stack
 
 from msfp_gen import Effects, Motion, Scene, Solver, Top, simulate
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 
 @pytest.fixture(scope="module")

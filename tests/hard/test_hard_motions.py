@@ -11,7 +11,7 @@ from support import Array
 from support.stacks import PLANAR, a_pendulum, a_rig, a_stack, off_the_reference, pendulum_angle, pushed, swing
 
 from msfp_gen import Bearing, Effects, InputError, Motion, Scene, Solver, Top, load_scene, simulate
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 
 def triple(**values: float) -> Bearing:

@@ -13,8 +13,8 @@ from support.stacks import LOAD, PLANAR, a_pendulum, a_rig, a_stack, holds, nest
 
 from msfp_gen import Effects, Motion, RunError, Scene, Solver, simulate
 from msfp_gen.results.history import History
+from msfp_gen.results.result import Result
 from msfp_gen.scene.top import MassTop
-from msfp_gen.simulation.result import Result
 
 MASSLESS = Effects(dimension="planar", sliders="massless", bouc_wen="report")
 

@@ -12,7 +12,7 @@ from support.stacks import LOAD, PLANAR, a_body, a_stack, nested_radii
 
 from msfp_gen import Effects, Motion, RunError, Scene, Solver, Top, presets, simulate
 from msfp_gen.results.history import Counters
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 TFP = (5, 2, 2)
 REPORT = Effects(bouc_wen="report")

@@ -20,8 +20,8 @@ from support.stacks import (
 )
 
 from msfp_gen import Bearing, Effects, Motion, RunError, Scene, Solver, Top, load_scene, simulate
+from msfp_gen.results.result import Result
 from msfp_gen.scene.scene_fields import InitialState
-from msfp_gen.simulation.result import Result
 
 TFP, RADII = (5, 2, 2), [1.0, 0.3, 0.3, 1.0]
 USUAL = {"friction": [0.03, 0.015, 0.015, 0.1], "capacity": [0.2, 0.06, 0.06, 0.2]}

@@ -58,7 +58,7 @@ OWN = {
     "jit/compiler.py",
     "jit/prebuilt.py",
     "results/files.py",
-    "simulation/streamed_rows.py",
+    "simulation/rows.py",
 }
 VALUES: list[Any] = [
     "",

@@ -8,7 +8,7 @@ from support import Array, thinned
 from support.stacks import PLANAR, a_pendulum, a_rig, a_stack, arm_and_inertia, off_the_reference, pushed, swing
 
 from msfp_gen import Bearing, Motion, Scene, Solver, Top, simulate
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 STIFFNESSES = [1e5, 1e6, 1e7, 1e8, 1e9, 1e10]
 AT_RIM, RADIUS = 0.2, 0.5  # [rad], [m]

@@ -20,9 +20,9 @@ from support.random_states import inputs, sensible
 from msfp_gen import Effects, InputError, Layout, Motion, RunError, Scene, Solver, build_model, simulate
 from msfp_gen.generator import generate
 from msfp_gen.jit.build import runtime_sources
+from msfp_gen.results.result import Result
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
 from msfp_gen.scene.friction_parameters import coefficient
-from msfp_gen.simulation.result import Result
 from msfp_gen.specification.friction_laws import (
     BUILT_IN,
     HEAT_ERROR,

@@ -16,10 +16,10 @@ from msfp_gen import Effects, Load, Motion, Rotation, Scene, simulate
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.results.gradient import ENERGIES
 from msfp_gen.results.history import ENERGY
-from msfp_gen.results.row_unpacking import unpacked
 from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.parameters import Parameter, changed_parameters, parameters_of
 from msfp_gen.simulation.gradients import start_gradients
+from msfp_gen.simulation.rows import unpacked
 from msfp_gen.simulation.simulate import RunSequence
 
 STACK = (

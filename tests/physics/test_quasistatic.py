@@ -14,8 +14,8 @@ from support import scene_of
 
 from msfp_gen import Auto, Effects, Load, Motion, Scene, Top, presets, simulate
 from msfp_gen.buildings.explain import explain
+from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import damping_share, quasistatic
-from msfp_gen.simulation.result import Result
 from msfp_gen.specification.friction_laws import HYSTERESIS, Hysteresis
 
 PLANAR = Effects(dimension="planar", sliders="massless")

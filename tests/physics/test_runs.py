@@ -26,8 +26,8 @@ from msfp_gen import (
     presets,
     simulate,
 )
+from msfp_gen.results.result import Result
 from msfp_gen.scene.scene_fields import InitialState, Stop
-from msfp_gen.simulation.result import Result
 
 LOAD, ROTATIONAL_STIFFNESS = 112e3, 1e6
 TESTS = [f"fenz-test{i}" for i in range(1, 6)]

@@ -22,12 +22,12 @@ from support.resuming import assert_same, interrupted
 from msfp_gen import Auto, Effects, InputError, Motion, Scene, Solver, Top, build_model, load_scene, presets, simulate
 from msfp_gen.buildings.explain import explain
 from msfp_gen.model.model import Ode
-from msfp_gen.results.restart_state import RestartState
+from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
 from msfp_gen.scene.standing import seat_stiffness
-from msfp_gen.simulation.result import Result
-from msfp_gen.simulation.segment import start_run
+from msfp_gen.simulation.restart_state import RestartState
+from msfp_gen.simulation.start import start_run
 
 BEARING = presets.bearing("fenz-tfp")
 MASS, GRAVITY = 11e3, BEARING.gravity

@@ -15,7 +15,7 @@ import pytest
 
 from msfp_gen import Bearing, Body, Effects, Layout, RunError, Scene, Surface, build_model, simulate
 from msfp_gen.model.model import Model
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "benchmarks"))  # also in the processes that tests start

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 from msfp_gen import Motion, Scene, simulate
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 from support import scene_of
 
 FORMULA = "mu * (1 - c1 * exp(-c2 * v)) * Max(1 - tanh(N / c3) / 5, 0.5)"

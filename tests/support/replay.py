@@ -9,7 +9,7 @@ import numpy as np
 
 from msfp_gen import Scene, build_model
 from msfp_gen.model.model import Model
-from msfp_gen.simulation.segment import start_run
+from msfp_gen.simulation.start import start_run
 from support import ROOT
 
 REPLAY = ROOT / "tests" / "support" / "c" / "replay.c"

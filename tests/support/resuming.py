@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from msfp_gen import RunError, Scene, simulate
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 
 def stopping_at(when: float) -> Any:

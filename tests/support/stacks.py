@@ -14,8 +14,8 @@ from reference.friction_circle import Push
 from reference.quasi_static import follow
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top, simulate
+from msfp_gen.results.result import Result
 from msfp_gen.scene.scene_fields import InitialState
-from msfp_gen.simulation.result import Result
 from support import Array
 
 LOAD, TILT_STIFFNESS, SIDE_STIFFNESS = 1e5, 1e6, 1e9

@@ -11,10 +11,10 @@ import xarray as xr
 
 from msfp_gen.motions.motion import Motion
 from msfp_gen.results.history import ENERGY, Counters, Event, History
+from msfp_gen.results.result import Result
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import Top
-from msfp_gen.simulation.result import Result
 from msfp_gen.specification.layout import Effects, Layout
 
 CAPACITIES = (0.065, 0.019, 0.019, 0.065)

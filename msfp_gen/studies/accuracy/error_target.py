@@ -24,9 +24,9 @@ from msfp_gen.specification.layout import Auto, Effects
 from msfp_gen.studies.accuracy.timed_run import CUT_OFF, Errors, Trial, dopri5_cost, errors, largest_error, run_native
 
 if TYPE_CHECKING:
+    from msfp_gen.results.result import Result
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
-    from msfp_gen.simulation.result import Result
 
 AFTER_IMPACTS = ", and after impacts,"
 CANDIDATE_TOLERANCES = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21))  # 1e-2, 3e-3, 1e-3 ... 1e-10

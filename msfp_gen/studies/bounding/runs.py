@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.analysis.characterise import Characterisation
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
@@ -20,6 +19,7 @@ from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.figures import COLOURS, INK, displacement, displacement_label, engineering, force, page
 from msfp_gen.figures.bearing import axes_along
 from msfp_gen.figures.style import THIN, headline, subscript
+from msfp_gen.results.characterise import Characterisation
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.friction_parameters import proportional, select_friction
 from msfp_gen.scene.scene import Scene
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from msfp_gen.buildings.file import AnyScene
+    from msfp_gen.results.result import Result
     from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.simulation.result import Result
 
 CASES = ("lower", "nominal", "upper")
 # Word in the name of a model -> the effect that is then prescribed for all cases.

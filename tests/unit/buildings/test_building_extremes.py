@@ -10,10 +10,10 @@ import pytest
 from support.buildings import BEARING, frame, scene
 
 from msfp_gen import Motion, Solver, simulate
-from msfp_gen.buildings import compiled_run
-from msfp_gen.buildings.compiled_run import start_run, unpacked
 from msfp_gen.buildings.extremes import BuildingExtremes
 from msfp_gen.results.geometry import contact_offsets
+from msfp_gen.simulation import building_run
+from msfp_gen.simulation.building_run import start_run, unpacked
 
 ROUNDING = 1e-12  # of sums of some ten terms that differ in the order of addition
 EVENTFUL = scene(frame(), duration=0.8)
@@ -54,7 +54,7 @@ def test_rims_push_with_their_stiffness():
 
 def test_places_of_contacts_are_those_of_the_rows(monkeypatch: pytest.MonkeyPatch):
     """The compiled sine against the positions of contacts by `contact_offsets`, which drawings use."""
-    monkeypatch.setattr(compiled_run, "KEPT", (*compiled_run.KEPT, "angles", "q"))
+    monkeypatch.setattr(building_run, "KEPT", (*building_run.KEPT, "angles", "q"))
     run = start_run(scene(frame(), duration=0.8, solver=Solver(max_step=1e-3), output_step=1e-3))
     while run.run.advance(1000):
         pass

@@ -14,14 +14,14 @@ from support.synthetic import loops as loops_of_one
 from support.synthetic import opened
 
 from msfp_gen import Effects, InputError, RunError, Solver, characterise, simulate
-from msfp_gen.analysis.characterise import characterised, csv_rows
-from msfp_gen.analysis.loops import ForcePath as Motions
-from msfp_gen.analysis.summary import summary_of_bearing
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import plot_loops, plot_orbit, plot_result, plot_sliding
+from msfp_gen.results.characterise import characterised, csv_rows
 from msfp_gen.results.files import table_of
 from msfp_gen.results.joining import at_times
+from msfp_gen.results.loops import ForcePath as Motions
 from msfp_gen.results.note import Note
+from msfp_gen.results.summary import summary_of_bearing
 from msfp_gen.studies.columns import Counts, catalogue
 
 
@@ -98,7 +98,7 @@ def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
 def test_columns_of_a_scene_are_those_of_its_pushed():
     """In order, and with the same values; of a bearing those of the effects that are modelled."""
     for run in (pushed(), loops_of_one()):
-        storage, exported = run.storage(), {column.name: column.values for column in table_of(run.dataset)}
+        storage, exported = run.storage, {column.name: column.values for column in table_of(run.dataset)}
         columns, arrays = storage.columns(run.scene), storage.arrays_of(run)
         assert list(exported) == [name for name, (variable, _) in columns.items() if variable.field in arrays]
         for name, values in exported.items():

@@ -11,8 +11,8 @@ import pytest
 from support.buildings import BEARING, INTERFACE, LOAD, MOTION, frame, scene
 
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, InputError, Motion, RunError, simulate
-from msfp_gen.buildings.compiled_run import result_of, start_run
 from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.simulation.building_run import result_of, start_run
 
 EVENTFUL = scene(frame(), duration=0.8)
 

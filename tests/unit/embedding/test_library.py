@@ -34,7 +34,7 @@ from msfp_gen.embedding.library import export_library
 from msfp_gen.generator.interface import ABI_VERSION, model_name
 from msfp_gen.jit.compiler import find_compiler
 from msfp_gen.jit.library import BuiltLibrary, Platform
-from msfp_gen.simulation.segment import start_run
+from msfp_gen.simulation.start import start_run
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import ModelSpec
 

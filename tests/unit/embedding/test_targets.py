@@ -20,7 +20,7 @@ from support.replay import REPLAY, inputs
 from msfp_gen import Effects, Scene, build_model, cli, load_scene
 from msfp_gen.common.errors import CompileError
 from msfp_gen.jit import library as platforms
-from msfp_gen.simulation.segment import start_run
+from msfp_gen.simulation.start import start_run
 
 LAYOUT = ("5", "2", "2", "--dimension", "planar")  # half of the compiling of a spatial model
 FLAGS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")

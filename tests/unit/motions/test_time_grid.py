@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from msfp_gen import Effects, Load, Motion, Rotation, RunError, Scene, Solver, Top, presets, simulate
 from msfp_gen.motions.piecewise import ORDER, hermite5
 from msfp_gen.motions.time_grid import TIME_TOLERANCE, Resolution, TimeGrid, distinct_times, snapped
-from msfp_gen.simulation.result import Result
-from msfp_gen.simulation.segment import time_grid
+from msfp_gen.results.result import Result
+from msfp_gen.simulation.start import time_grid
 
 PLANAR = Effects(dimension="planar", sliders="massless")
 RIG = Top.rig(112e3, stiffness=1e6, damping=5.0, rotational_stiffness=1e6)

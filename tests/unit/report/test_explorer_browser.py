@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from msfp_gen import build_model, changed_scene, simulate
-from msfp_gen.analysis.loops import REVERSAL, closed_cycles, effective_properties, turning_points
 from msfp_gen.report.explore import (
     EXPLORED,
     Problem,
@@ -22,6 +21,7 @@ from msfp_gen.report.explore import (
     run_arguments,
     write_explorer,
 )
+from msfp_gen.results.loops import REVERSAL, closed_cycles, effective_properties, turning_points
 from tests.support.explorer_page import CHROMIUM, DRIVER, SLIDE, act, choose_preset, explorer_in_browser
 
 pytestmark = [

@@ -24,7 +24,7 @@ from msfp_gen.report.frames import instants, main_direction, packed, pieces, sel
 from msfp_gen.report.page import BEARING
 from msfp_gen.results.geometry import poses
 from msfp_gen.results.note import Note
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 
 @pytest.fixture(scope="module", autouse=True)

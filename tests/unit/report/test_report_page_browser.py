@@ -11,7 +11,7 @@ from support import preset_run
 from support.synthetic import opened
 
 from msfp_gen.report import write_report
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 DRIVER = shutil.which("chromedriver")

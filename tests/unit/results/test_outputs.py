@@ -17,8 +17,8 @@ from support.synthetic import loops
 from msfp_gen import InputError, load_scene
 from msfp_gen.cli import main
 from msfp_gen.results.files import WRITERS, table_of
+from msfp_gen.results.result import Result
 from msfp_gen.scene.file.loader import scene_from_table
-from msfp_gen.simulation.result import Result
 
 FLAT = (".csv", ".parquet")
 

@@ -13,12 +13,12 @@ from support import thinned
 from support.buildings import pushed
 from support.synthetic import LOAD, history, loops, opened, ramp, scene
 
-from msfp_gen.analysis.summary import energy_balance
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.errors import InputError
-from msfp_gen.results.history import ENERGY, quantities
+from msfp_gen.results.history import ENERGY, Counters, quantities
+from msfp_gen.results.result import Result
+from msfp_gen.results.summary import energy_balance
 from msfp_gen.scene.top import Top
-from msfp_gen.simulation.result import Counters, Result
 
 
 def still(surfaces: int = 1, rows: int = 3) -> Result:

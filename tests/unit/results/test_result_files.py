@@ -18,7 +18,7 @@ from support.damaged_results import forge, virtual
 
 from msfp_gen import InputError, Motion
 from msfp_gen.cli import main
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 COUNTS = [150, pytest.param(5000, marks=pytest.mark.slow)]
 

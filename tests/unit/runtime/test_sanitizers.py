@@ -17,7 +17,7 @@ from msfp_gen import Bearing, Effects, Layout, Motion, Scene, Solver, Top, simul
 from msfp_gen.generator import generate
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS, find_compiler
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 
 # Not optimised: nothing is removed before it is checked, and it compiles in two thirds of the time.
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-g", "-O0")

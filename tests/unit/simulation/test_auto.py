@@ -26,14 +26,14 @@ from msfp_gen import (
 )
 from msfp_gen.buildings.explain import explain
 from msfp_gen.motions.piecewise import ORDER
-from msfp_gen.results.restart_state import RestartState
+from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import Ending, all_effects, next_effects, stopping_monitors
 from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation import simulate as simulation
-from msfp_gen.simulation.result import Result
+from msfp_gen.simulation.restart_state import RestartState
 from msfp_gen.simulation.simulate import RunSequence
 
 FULL = Effects()

@@ -30,11 +30,11 @@ from msfp_gen import InputError, Motion, RunError, Scene, build_model, simulate
 from msfp_gen.cli import main
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import replacing
+from msfp_gen.results.result import Result
 from msfp_gen.scene.scene_fields import Stop
 from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation import simulate as simulation
-from msfp_gen.simulation.result import Result
-from msfp_gen.simulation.segment import start_run
+from msfp_gen.simulation.start import start_run
 from msfp_gen.specification.contract import STATUSES, names
 
 SCENES = {

@@ -15,8 +15,8 @@ import pytest
 from support import failure_of, hearing, scene_of
 
 from msfp_gen import Effects, Motion, RunError, Scene, Solver, Top, build_model, presets, simulate
+from msfp_gen.results.result import Result
 from msfp_gen.scene.scene_fields import InitialState
-from msfp_gen.simulation.result import Result
 
 LOAD = 112e3
 STILL = Motion(knots=[0.0, 1.0], coefficients=np.zeros((1, 6, 6)))

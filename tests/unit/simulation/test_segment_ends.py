@@ -16,10 +16,11 @@ from support.stacks import holds
 from msfp_gen import Auto, Effects, Load, Motion, RunError, Scene, Solver, Top, load_scene, presets, simulate
 from msfp_gen.results.history import History
 from msfp_gen.results.joining import joined
+from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import EffectSelection
-from msfp_gen.simulation.result import Result
-from msfp_gen.simulation.segment import Segment, start_run
+from msfp_gen.simulation.rows import Segment
 from msfp_gen.simulation.simulate import RunSequence
+from msfp_gen.simulation.start import start_run
 
 BEARING = presets.bearing("fenz-tfp")
 AUTO = Auto(dimension="planar", rims=True)  # three models: massless, inertial, and inertial with uplift

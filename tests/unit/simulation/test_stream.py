@@ -18,13 +18,13 @@ from msfp_gen import Auto, InputError, Load, Motion, RunError, Scene, Top, load_
 from msfp_gen.cli import main
 from msfp_gen.results import joining
 from msfp_gen.results.joining import thinned_history
+from msfp_gen.results.result import Result
 from msfp_gen.scene.file.loader import scene_text
 from msfp_gen.scene.scene_fields import Stop
-from msfp_gen.simulation import memory, streamed_rows
+from msfp_gen.simulation import memory, rows
 from msfp_gen.simulation import simulate as simulation
 from msfp_gen.simulation.checkpoint import Checkpoint
-from msfp_gen.simulation.result import Result
-from msfp_gen.simulation.row_file import RowFile
+from msfp_gen.simulation.rows import RowFile
 
 CLOCK = ("counter_wall_time", "provenance_build_seconds", "digest")
 PIECE = 71  # rows of a block: no run has a multiple of it
@@ -35,8 +35,8 @@ def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows go to disk and from there to the file in many blocks."""
     monkeypatch.setattr(simulation, "STEPS_PER_CALL", 20)
     monkeypatch.setattr(simulation, "ROWS_HELD", 16)
-    monkeypatch.setattr(streamed_rows, "BLOCK", PIECE)
-    monkeypatch.setattr(streamed_rows, "blocks", lambda count, rows: joining.blocks(count, rows, PIECE))
+    monkeypatch.setattr(rows, "BLOCK", PIECE)
+    monkeypatch.setattr(rows, "blocks", lambda count, read: joining.blocks(count, read, PIECE))
 
 
 def leaving() -> Scene:
@@ -140,7 +140,7 @@ def test_a_row_of_a_block_is_that_of_the_whole() -> None:
 
 
 def row_unpacked(segment: Any, rows: Any, first: Any) -> Any:
-    from msfp_gen.results.row_unpacking import history_of
+    from msfp_gen.simulation.rows import history_of
 
     return history_of(segment.model, rows, segment.azimuth, False, first)
 
@@ -249,7 +249,7 @@ def test_rows_of_one_long_step_are_limited(tmp_path: Path, monkeypatch: pytest.M
         take(self, run)
 
     monkeypatch.setattr(RowFile, "take", counted)
-    monkeypatch.setattr(streamed_rows, "blocks", joining.blocks)
+    monkeypatch.setattr(rows, "blocks", joining.blocks)
     scene = scene_of("fenz-test2", motion=Motion.harmonic(1e-4, 1e-4), duration=200.0, output_step=0.002)
     simulate(scene, stream=tmp_path / "run.nc")
     assert 5000 < max(held) < 10_020
@@ -288,9 +288,9 @@ def test_a_disk_that_fills_while_rows_are_written(tmp_path: Path, monkeypatch: p
 FULL = """
 import resource, sys
 from pathlib import Path
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.result import Result
 from msfp_gen.results.joining import blocks, taken
-from msfp_gen.simulation.streamed_rows import write_blocks
+from msfp_gen.simulation.rows import write_blocks
 path = Path(sys.argv[1])
 result = Result.from_netcdf(path)
 count, size = len(result.history.time), path.stat().st_size

@@ -42,9 +42,9 @@ from msfp_gen.common.cores import usable_cores
 from msfp_gen.model import model as models
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.prescribed import Rotation
+from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import EffectSelection
 from msfp_gen.scene.scene import InitialState
-from msfp_gen.simulation.result import Result
 from msfp_gen.studies import batch, pool
 from msfp_gen.studies.sweep import variations, varied_field
 

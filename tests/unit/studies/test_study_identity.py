@@ -17,10 +17,10 @@ from support.study_tables import rows_of, write_record
 import msfp_gen
 from msfp_gen import BaseSlab, Building, InputError, RunError, Storey, changed_scene, load_scene, simulate
 from msfp_gen.common.identity import fingerprint
+from msfp_gen.results.result import Result
 from msfp_gen.scene.file import motion_tables
 from msfp_gen.scene.file.catalogue import scene_table
 from msfp_gen.scene.file.loader import dumps
-from msfp_gen.simulation.result import Result
 from msfp_gen.studies import load_study
 from msfp_gen.studies.bounding.factors import factor_text
 from msfp_gen.studies.study.chunks import Chunks

@@ -11,12 +11,12 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from msfp_gen.analysis.loops import Branch, ForcePath, Loop, SurfaceDemand, branch_of, signed_slip, surface_demands
-from msfp_gen.analysis.summary import is_monotonic, transitions
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_rows
+from msfp_gen.results.loops import Branch, ForcePath, Loop, SurfaceDemand, branch_of, signed_slip, surface_demands
 from msfp_gen.results.run_data import BearingData, RunData
+from msfp_gen.results.summary import is_monotonic, transitions
 
 Kind = Literal["cycles", "monotonic", "one direction", "two directions"]
 CSV_SUFFIXES = (".csv",)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from support.synthetic import LOAD, contact, history, loops, ramp, scene
 
-from msfp_gen.analysis.summary import is_monotonic, stopping_displacement, transitions
+from msfp_gen.results.result import Result
+from msfp_gen.results.summary import is_monotonic, stopping_displacement, transitions
 from msfp_gen.scene.top import Top
-from msfp_gen.simulation.result import Result
 
 KEYS = {"u_star", "u_star_star", "u_dr1", "u_dr4", "F_dr1", "F_dr4", "resolution"}
 

@@ -24,8 +24,8 @@ from msfp_gen.model.model import Model, build_model
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.time_grid import TimeGrid, snapped
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
-from msfp_gen.results.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.scene.effect_switching import Ending, monitor_options, next_effects, stopping_monitors
+from msfp_gen.simulation.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.specification.contract import WORKS, names
 from msfp_gen.specification.layout import Auto, Effects
 

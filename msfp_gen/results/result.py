@@ -1,25 +1,38 @@
-"""`AnyResult`: what results of a bearing, of a building and of one of its bearings offer beside rows and files."""
+"""`Result`: the result of a run; `AnyResult`: what those of a building and of one of its bearings offer alike."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from html import escape
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from msfp_gen.analysis.characterise import Characterisation
-from msfp_gen.analysis.characterise import characterise as characterise_bearing
-from msfp_gen.analysis.summary import rows_of_bearing, surface_table, transition_table
-from msfp_gen.analysis.verdict import Verdict, verdict_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.results.files import ResultFiles
+from msfp_gen.results import dataset
+from msfp_gen.results.characterise import Characterisation
+from msfp_gen.results.characterise import characterise as characterise_bearing
+from msfp_gen.results.files import ResultFiles, Storage
 from msfp_gen.results.note import by_importance
-from msfp_gen.results.run_data import BearingData
+from msfp_gen.results.run_data import BearingData, RunData
+from msfp_gen.results.summary import (
+    rows_of_bearing,
+    summarise,
+    summarise_gradients,
+    surface_table,
+    time_row,
+    transition_table,
+    work_rows,
+)
+from msfp_gen.results.verdict import Verdict, verdict_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MAX_NOTES = 3  # printed, the most important ones; the others are counted
 MAX_POINTS = 600  # of the curve
@@ -35,7 +48,7 @@ class Curve(NamedTuple):
     caption: str
 
 
-class AnyResult(ResultFiles):
+class AnyResult(ResultFiles, ABC):
     """Summary, printed text, tables and characterisation of a result.
 
     counters: of the work of the solver. notes: messages of the monitors, in order of time (docs/effects.md).
@@ -154,6 +167,47 @@ class OneBearing(AnyResult, BearingData):
         bearing did not move.
         """
         return characterise_bearing(self)
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class Result(OneBearing, RunData):
+    """The result of `simulate`; a RunError has one in `.result` if the run failed after its start.
+
+    status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one line of
+    text, "" for a run that succeeded. counters: the work of the solver. provenance: versions, model keys and solver
+    options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
+    """
+
+    storage: ClassVar[Storage] = dataset
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Main results of the run in SI units, as values that JSON can hold; `summary.summarise` lists the keys."""
+        return summarise(self) | {"verdict": self.verdict.as_dict}
+
+    def main_results(self) -> Rows:
+        """Label and value of the main results."""
+        return [time_row(self.summary), *super().main_results()]
+
+    def work_rows(self) -> Rows:
+        """Label and value of its energy and of the work of the solver."""
+        return work_rows(self.summary)
+
+    @cached_property
+    def gradient(self) -> xr.Dataset:
+        """Derivatives of the dataset with respect to parameters, first dimension `parameter`; docs/gradients.md.
+
+        Raises InputError where the run computed none.
+        """
+        return dataset.to_gradient_dataset(self)
+
+    @cached_property
+    def gradient_summary(self) -> dict[str, dict[str, Any]]:
+        """Derivatives of the scalars of the summary, by the path of the parameter; docs/gradients.md.
+
+        Raises InputError where the run computed none.
+        """
+        return summarise_gradients(self)
 
 
 def _svg(x: Array, y: Array) -> str:

@@ -19,10 +19,10 @@ from support import Array, preset_run, scene_of
 from support.synthetic import LOAD, history, loops, ramp, scene
 
 from msfp_gen import Bearing, Body, Effects, InputError, Layout, Motion, Scene, Solver, Surface, Top, simulate
-from msfp_gen.analysis.characterise import Characterisation, characterise
-from msfp_gen.analysis.loops import closed_cycles, loop_area, turning_points
 from msfp_gen.cli import main
-from msfp_gen.simulation.result import Result
+from msfp_gen.results.characterise import Characterisation, characterise
+from msfp_gen.results.loops import closed_cycles, loop_area, turning_points
+from msfp_gen.results.result import Result
 
 D, YIELD, SLOPE, STRENGTH = 0.05, 2e-3, 2e5, 9e3  # a bilinear loop: amplitude, yield displacement, k_d, Q
 

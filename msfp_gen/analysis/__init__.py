@@ -1,1 +1,0 @@
-"""Analysis of one run: summary, sliding regimes, effective properties and demands."""
