@@ -19,7 +19,7 @@ from instructions import AVX2, instructions
 from quick import parser, pick
 
 from msfp_gen import Scene, load_scene
-from msfp_gen.generator.gradients import COLUMNS
+from msfp_gen.generator.lower import COLUMNS
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.parameters import parameters_of
 from msfp_gen.simulation.gradients import start_gradients

@@ -62,7 +62,7 @@ CHOSEN: dict[str, tuple[str, ...]] = {
     "msfp_gen/specification/friction_laws.py": ("tests/physics/test_friction_laws.py",),
     "generator/seat.py": ("tests/physics/test_uplift.py",),
     "generator/top*.py": (EQUATIONS, "tests/physics/test_vertical_compliance.py"),
-    "generator/gradients.py": ("tests/physics/test_gradients.py",),
+    "generator/lower.py": (EQUATIONS, "tests/physics/test_gradients.py", "tests/physics/test_tangents.py"),
     "generator/columns.py": (EQUATIONS, "tests/physics/test_gradients.py", "tests/physics/test_tangents.py"),
     "generator/schedule.py": (EQUATIONS, "tests/unit/generator"),
     "generator/drivers.py": (EQUATIONS, "tests/unit/generator", "tests/physics/test_gradients.py"),

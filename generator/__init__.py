@@ -44,8 +44,7 @@ def generate(spec: ModelSpec) -> Generated:
     from .derive import derive
     from .drivers import directional_kernels, end_kernels
     from .emit import emit
-    from .gradients import directional_programs
-    from .lower import lower
+    from .lower import directional_programs, lower
 
     times = [time.perf_counter()]
     equations = derive(spec)

@@ -12,8 +12,7 @@ import sympy as sp
 
 from .blocks import Blocks
 from .parameters import ValueBlocks, places
-from .program import Program, Vector
-from .vectors import add, combine, cross, dot, project, scale, subtract
+from .program import Program, Vector, add, combine, cross, dot, project, scale, subtract
 
 Symbols = dict[str, Any]
 

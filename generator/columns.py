@@ -17,8 +17,7 @@ import sympy as sp
 from .blocks import Blocks
 from .body import rate_of_angular_momentum, relative_turning
 from .contact import contact_basis
-from .program import AXIAL, POLAR, Block, BlockBuilder, Program, Vector
-from .vectors import add, cross, project, scale, subtract
+from .program import AXIAL, POLAR, Block, BlockBuilder, Program, Vector, add, cross, project, scale, subtract
 
 Symbols = dict[str, Any]
 ORDERS = (0, 1, 2)

@@ -17,8 +17,7 @@ from . import laws
 from .blocks import Blocks
 from .functions import ArcTan2, Modulus, Select
 from .laws import Shear, friction_rates
-from .program import Program, Vector
-from .vectors import add, combine, cross, dot, project, scale
+from .program import Program, Vector, add, combine, cross, dot, project, scale
 
 Symbols = dict[str, Any]
 ALIGNED = sp.Float("1e-9")

@@ -11,8 +11,7 @@ from typing import Any
 
 from . import two_port as ends
 from .derive import Equations
-from .gradients import directional
-from .lower import Kernel, lower
+from .lower import Kernel, directional, lower
 from .program import Block, Program
 from .schedule import (
     COLUMNS,

@@ -16,9 +16,8 @@ from msfp_gen.specification.layout import ModelSpec
 from .derive import Equations
 from .drivers import schedule_context, scheduled_kernels
 from .functions import to_c
-from .gradients import COLUMNS, contact_lists
 from .interface import checks_context, environment, interface_context, model_name, public_header, word_enums
-from .lower import Kernel, jacobian_column, ordered_active_inputs
+from .lower import COLUMNS, Kernel, contact_lists, jacobian_column, ordered_active_inputs
 from .program import Block, Use
 
 # Each is made from the template of its name.

@@ -11,8 +11,7 @@ import sympy as sp
 
 from .blocks import Blocks
 from .functions import Step
-from .program import Program
-from .vectors import cross, dot, subtract
+from .program import Program, cross, dot, subtract
 
 Symbols = dict[str, Any]
 

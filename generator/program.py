@@ -2,7 +2,7 @@
 
 A program is a list of statements `name = small expression`, each over inputs and earlier names. Every intermediate
 result is named when it is formed. Expressions therefore stay small, and derivatives are taken statement by statement
-(`lower.py`).
+(`lower.py`). Vectors have components along E1, E2, E3 or along a local basis.
 """
 
 from __future__ import annotations
@@ -266,3 +266,42 @@ class Program:
 def fields_of(block: Block, quantities: Iterable[str]) -> list[str]:
     """Names of the stored fields of the given quantities of a block."""
     return [part for quantity in quantities for part in block.quantities[quantity] if isinstance(part, str)]
+
+
+ZERO: Vector = (sp.Integer(0), sp.Integer(0), sp.Integer(0))
+
+
+def add(*vectors: Vector) -> Vector:
+    """Sum of vectors."""
+    x, y, z = (sp.Add(*components) for components in zip(*vectors, strict=True))
+    return (x, y, z)
+
+
+def scale(factor: sp.Expr, vector: Vector) -> Vector:
+    """Scalar times vector."""
+    return (factor * vector[0], factor * vector[1], factor * vector[2])
+
+
+def subtract(a: Vector, b: Vector) -> Vector:
+    """Difference a - b."""
+    return add(a, scale(sp.Integer(-1), b))
+
+
+def dot(a: Vector, b: Vector) -> sp.Expr:
+    """Scalar product."""
+    return sp.Add(*(p * q for p, q in zip(a, b, strict=True)))
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product a x b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def combine(basis: tuple[Vector, Vector, Vector], components: Vector) -> Vector:
+    """Vector with the given components along `basis`."""
+    return add(*(scale(c, t) for c, t in zip(components, basis, strict=True)))
+
+
+def project(basis: tuple[Vector, Vector, Vector], vector: Vector) -> Vector:
+    """Components of a vector along `basis`."""
+    return (dot(basis[0], vector), dot(basis[1], vector), dot(basis[2], vector))

@@ -16,8 +16,7 @@ import sympy as sp
 
 from .blocks import Blocks
 from .functions import Select, Step
-from .program import Program, Vector
-from .vectors import add, combine, cross, dot, scale, subtract
+from .program import Program, Vector, add, combine, cross, dot, scale, subtract
 
 Symbols = dict[str, Any]
 CENTRE = sp.Float("1e-60")

@@ -9,8 +9,7 @@ import sympy as sp
 from .blocks import Blocks
 from .body import energy_terms, rate_of_angular_momentum
 from .functions import Select
-from .program import Program, Vector
-from .vectors import add, cross, scale
+from .program import Program, Vector, add, cross, scale
 
 Symbols = dict[str, Any]
 

@@ -15,10 +15,8 @@ import sympy as sp
 
 from .blocks import Blocks
 from .functions import ArcTan2, Stumpff
-from .gradients import differentiated
-from .lower import Kernel, Tangent, active_inputs, jacobian_column, lower, values_of_tangents
-from .program import Block, Program, Statement, Use, fields_of
-from .vectors import ZERO, add, cross, dot, scale, subtract
+from .lower import Kernel, Tangent, active_inputs, differentiated, jacobian_column, lower, values_of_tangents
+from .program import ZERO, Block, Program, Statement, Use, add, cross, dot, fields_of, scale, subtract
 
 Symbols = dict[str, Any]
 

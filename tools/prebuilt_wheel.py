@@ -14,10 +14,9 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from msfp_gen.jit.build import build_driver, prepare
+from msfp_gen.jit.build import LEVELS, add_prebuilt, build_driver, prebuilt_specs, prepare
 from msfp_gen.jit.cache import digest_sources
 from msfp_gen.jit.compiler import zig_program
-from msfp_gen.jit.prebuilt import LEVELS, add_prebuilt, prebuilt_specs
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from build_backend import normal_zip, rewrite

@@ -9,15 +9,22 @@
 
 Drivers of two-ports, such as the run of a building, are built, cached and loaded in the same way. They include `msfp.h`
 and know models by their tables of functions alone, so one build serves all models.
+
+A wheel brings models compiled, so that common layouts need no compiler; `tools/prebuilt_wheel.py` makes it.
+`msfp_gen/prebuilt/` has one folder for each model and level of the processor, and one for each driver of two-ports,
+with a manifest and an extension that uses only the limited API of Python, so that one file serves all versions. A
+checkout has none, nor has a pure wheel.
 """
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import json
 import os
 import re
 import shutil
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache as remember
@@ -31,14 +38,17 @@ from typing import Any
 from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.tables import Table
 from msfp_gen.jit import cache
-from msfp_gen.jit.compiler import EXTENSION_SUFFIX, LOG_NAME, compile_extension
-from msfp_gen.jit.prebuilt import find_prebuilt, find_prebuilt_driver, prebuilt_key
-from msfp_gen.specification.layout import ModelSpec
+from msfp_gen.jit.compiler import CFLAGS, COMPILER, EXTENSION_SUFFIX, LOG_NAME, compile_extension, words, x86_64_level
+from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 Progress = Callable[[str, float], None]
 ENTRY = "msfp_entry.c"
 _INCLUDE = re.compile(r'(?:#include|cdef extern from) "([\w.]+)"')
 GENERATION_SHARE = 0.13  # of the build time, for the progress display; compilation takes the rest
+SUFFIX = ".abi3.so"  # of the models of a wheel
+LEVELS = (3, 1)
+"""Levels of x86-64 that a wheel has models for: every processor, and those with AVX2."""
+LAYOUTS = (Layout(2, 1, 0), Layout.dfp(), Layout.tfp())
 
 
 @dataclass(frozen=True)
@@ -357,3 +367,92 @@ def _build_driver(entry: cache.Entry, files: dict[str, str], folder: Path) -> ca
     )
     manifest.write(folder)
     return manifest
+
+
+def prebuilt_specs() -> list[ModelSpec]:
+    """The models of a wheel: single, double and triple pendulum, planar and spatial, sliders and rims as selected; and
+    those that a building moves at both ends, without and with uplift. The triple one also with the friction of
+    earthquakes, as the presets have it.
+    """
+    alone = [
+        ModelSpec(layout, Effects(dimension=dimension, sliders=sliders, rims=rims))
+        for layout in LAYOUTS
+        for dimension in ("spatial", "planar")
+        for sliders in ("inertial", "massless")
+        for rims in (True, False)
+    ]
+    below = [Effects(top_rotation=True, uplift=uplift) for uplift in (False, True)]
+    shaken = [*(Effects(rims=rims) for rims in (True, False)), *below]
+    heated = [ModelSpec(Layout.tfp(), replace(effects, friction="pvt", bouc_wen="plastic")) for effects in shaken]
+    return [*alone, *(ModelSpec(layout, effects) for layout in LAYOUTS for effects in below), *heated]
+
+
+def prebuilt_folder() -> Path:
+    """Folder of the models that came with the package; it need not exist."""
+    return cache.PACKAGE / "prebuilt"
+
+
+def find_prebuilt(spec: ModelSpec) -> tuple[Path, cache.Manifest] | None:
+    """Folder and manifest of a model that came with the package and runs on this processor; None if there is none.
+
+    None too where the user names a compiler or its flags (CC, MSFP_GEN_CFLAGS). A damaged one raises a warning.
+    """
+    return _find(cache.module_name(spec), spec.key)
+
+
+def find_prebuilt_driver(module: str, files: Mapping[str, str]) -> tuple[Path, cache.Manifest] | None:
+    """The same for a module of these files, name -> text, that drives models."""
+    return _find(module, cache.digest_files(files))
+
+
+def add_prebuilt(level: int, built: Path, root: Path) -> Path:
+    """Copy what is in the folder `built`, compiled for a level of the processor, to `root`; returns its folder.
+
+    The manifest states neither the times of the build nor where its compiler lay, so that two builds are the same.
+    """
+    manifest = cache.Manifest.read(built)
+    data = (built / manifest.extension).read_bytes()
+    folder = root / _folder_name(manifest.module, _content(manifest), level)
+    folder.mkdir(parents=True)
+    extension = f"{manifest.module}{SUFFIX}"
+    (folder / extension).write_bytes(data)
+    files = {extension: hashlib.sha256(data).hexdigest()}
+    compiler = [Path(word).name if Path(word).is_absolute() else word for word in manifest.inputs["compiler"]]
+    inputs = {**manifest.inputs, "compiler": compiler}
+    replace(manifest, inputs=inputs, key=folder.name, extension=extension, files=files, stages={}).write(folder)
+    return folder
+
+
+def prebuilt_key(manifest: cache.Manifest) -> str:
+    """Hash of what determines its numbers: one for all levels of the processor, since all give the same."""
+    return hashlib.sha256(f"prebuilt\0{manifest.inputs['sources']}\0{_content(manifest)}".encode()).hexdigest()
+
+
+def _content(manifest: cache.Manifest) -> str:
+    """`ModelSpec.key` of a model, the digest of the files of any other module."""
+    return str(manifest.inputs.get("spec") or manifest.inputs["files"])
+
+
+def _find(module: str, content: str) -> tuple[Path, cache.Manifest] | None:
+    root = prebuilt_folder()
+    if not root.is_dir() or words(COMPILER) or words(CFLAGS):
+        return None
+    reached = x86_64_level() or 1
+    for level in (level for level in LEVELS if level <= reached):
+        folder = root / _folder_name(module, content, level)
+        if not folder.is_dir():
+            continue
+        try:
+            manifest = cache.Manifest.read(folder)
+            if cache.digest(folder / manifest.extension) == manifest.files[manifest.extension]:
+                return folder, manifest
+        except (OSError, ValueError, TypeError, KeyError):
+            pass
+        warnings.warn(f"{folder} is damaged and not used; install msfp-gen again", RuntimeWarning, stacklevel=3)
+    return None
+
+
+def _folder_name(module: str, content: str, level: int) -> str:
+    """A name that only a module of these sources and this content has."""
+    key = hashlib.sha256(f"{cache.digest_sources()}\0{content}".encode()).hexdigest()
+    return f"{module}-{key[:20]}-v{level}"

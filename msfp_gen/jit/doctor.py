@@ -15,10 +15,9 @@ from time import perf_counter
 
 from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.tables import Table
-from msfp_gen.jit.build import load_extension
+from msfp_gen.jit.build import find_prebuilt, load_extension, prebuilt_specs
 from msfp_gen.jit.cache import cache_root
 from msfp_gen.jit.compiler import check_headers, compile_extension, find_compiler
-from msfp_gen.jit.prebuilt import find_prebuilt, prebuilt_specs
 
 DISTRIBUTION = "msfp-gen"
 FREE_DISK = 200e6  # [bytes] space for several dozen compiled models

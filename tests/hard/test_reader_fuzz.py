@@ -56,7 +56,7 @@ OWN = {
     "report/explore.py",
     "embedding/unit.py",
     "jit/compiler.py",
-    "jit/prebuilt.py",
+    "jit/build.py",
     "results/files.py",
     "simulation/rows.py",
 }

@@ -10,11 +10,10 @@ from pathlib import Path
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.records import cosmos, csmip, csv_table, knet, peer
-from msfp_gen.motions.records.channel import Channel, assemble_record
 from msfp_gen.motions.records.correction import Corrected, baseline_corrected, strong_window, uncorrected
 from msfp_gen.motions.records.csv_table import Table, read_table, write_csv
 from msfp_gen.motions.records.peer import read_peer
-from msfp_gen.motions.records.record import Record
+from msfp_gen.motions.records.record import Channel, Record, assemble_record
 from msfp_gen.motions.records.scaling import ScaledSuite, ScaleTo, asce7_spectrum, prepared, scaled_suite
 from msfp_gen.motions.records.spectrum import Spectrum, response_spectrum
 from msfp_gen.motions.records.text import Lines, lines_of, read_lines

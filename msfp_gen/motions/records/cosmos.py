@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from msfp_gen.motions.records.channel import DOWN, QUANTITIES, UNKNOWN, UP, Channel, si_factor
+from msfp_gen.motions.records.record import DOWN, QUANTITIES, UNKNOWN, UP, Channel, si_factor
 from msfp_gen.motions.records.text import Lines, word
 
 FORMAT = "COSMOS V1, V2"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from msfp_gen.motions.records.channel import DOWN, QUANTITIES, UNKNOWN, UP, Channel, si_factor
+from msfp_gen.motions.records.record import DOWN, QUANTITIES, UNKNOWN, UP, Channel, si_factor
 from msfp_gen.motions.records.text import Lines, search, word
 
 FORMAT = "CSMIP V1, V2"

@@ -7,7 +7,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from msfp_gen.motions.records.channel import UP, Channel
+from msfp_gen.motions.records.record import UP, Channel
 from msfp_gen.motions.records.text import Lines, column
 
 FORMAT = "K-NET"

@@ -8,8 +8,17 @@ from os import PathLike
 from pathlib import Path
 
 from msfp_gen.common.errors import InputError
-from msfp_gen.motions.records.channel import DOWN, QUANTITIES, UNKNOWN, UP, Channel, assemble_record, si_factor
-from msfp_gen.motions.records.record import Record, stem
+from msfp_gen.motions.records.record import (
+    DOWN,
+    QUANTITIES,
+    UNKNOWN,
+    UP,
+    Channel,
+    Record,
+    assemble_record,
+    si_factor,
+    stem,
+)
 from msfp_gen.motions.records.text import Lines, column, read_lines
 
 FORMAT = "PEER AT2, VT2, DT2"

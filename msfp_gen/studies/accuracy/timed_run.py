@@ -15,7 +15,6 @@ from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.batch import OUT_OF_TIME, run_to_end
 
 if TYPE_CHECKING:
-    from msfp_gen.results.result import Result
     from msfp_gen.scene.scene import Scene
 
 ERRORS = {

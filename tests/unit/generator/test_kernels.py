@@ -16,7 +16,7 @@ from support import Array
 from msfp_gen import Effects, Layout
 from msfp_gen.generator import generate
 from msfp_gen.generator.derive import Equations, derive
-from msfp_gen.generator.gradients import COLUMNS, DIFFERENTIATED
+from msfp_gen.generator.lower import COLUMNS, DIFFERENTIATED
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.specification.layout import ModelSpec

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from msfp_gen import Effects, Layout
-from msfp_gen.generator import gradients, two_port
+from msfp_gen.generator import lower, two_port
 from msfp_gen.generator.derive import Equations, derive
 from msfp_gen.generator.schedule import (
     Call,
@@ -121,4 +121,4 @@ def test_names_kept_by_hand_are_those_of_blocks():
     for name, quantities in two_port.FIXED.items():
         assert set(quantities) <= set(getattr(blocks, name).quantities), name
     assert set(two_port.CONTACT) <= set(blocks.contact.quantities)
-    assert set(gradients.CONTACT) <= {field.name for field in blocks.contact.fields}
+    assert set(lower.CONTACT) <= {field.name for field in blocks.contact.fields}

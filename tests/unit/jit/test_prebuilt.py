@@ -10,7 +10,7 @@ import pytest
 from support import fake_model
 
 from msfp_gen.common.errors import InputError
-from msfp_gen.jit import build, cache, compiler, doctor, prebuilt
+from msfp_gen.jit import build, cache, compiler, doctor
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 SPEC = ModelSpec(Layout.dfp(), Effects())
@@ -25,8 +25,8 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setenv("MSFP_GEN_CACHE", str(folder / "models"))
         patch.setitem(__import__("sys").modules, "msfp_gen.generator", fake_model.generator())
         built = build.prepare(SPEC, portable=True)
-        for level in prebuilt.LEVELS:
-            prebuilt.add_prebuilt(level, built.folder, prebuilt.prebuilt_folder())
+        for level in build.LEVELS:
+            build.add_prebuilt(level, built.folder, build.prebuilt_folder())
     return folder / "house"
 
 
@@ -57,7 +57,7 @@ def test_the_model_of_the_processor_is_used(
 ) -> None:
     keys = set()
     for found in (reached, 3):
-        monkeypatch.setattr(prebuilt, "x86_64_level", lambda found=found: found)
+        monkeypatch.setattr(build, "x86_64_level", lambda found=found: found)
         info = build.prepare(SPEC)
         keys.add(info.key)
         assert info.folder.name.endswith(f"-v{level if found == reached else 3}")
@@ -68,9 +68,9 @@ def test_the_model_of_the_processor_is_used(
 def test_a_compiler_or_flags_of_the_user_come_first(
     installed: Path, name: str, value: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert prebuilt.find_prebuilt(SPEC) is not None
+    assert build.find_prebuilt(SPEC) is not None
     monkeypatch.setenv(name, value)
-    assert prebuilt.find_prebuilt(SPEC) is None
+    assert build.find_prebuilt(SPEC) is None
 
 
 def test_refused_flags_are_named_as_without_prebuilt_models(installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,7 +82,7 @@ def test_refused_flags_are_named_as_without_prebuilt_models(installed: Path, mon
 
 @pytest.mark.parametrize("damage", ["one byte", "no extension", "half a manifest"])
 def test_a_damaged_one_is_not_used(installed: Path, damage: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prebuilt, "x86_64_level", lambda: 1)
+    monkeypatch.setattr(build, "x86_64_level", lambda: 1)
     (folder,) = installed.glob("*-v1")
     extension = folder / "msfp_3_1_1.abi3.so"
     if damage == "one byte":
@@ -93,12 +93,12 @@ def test_a_damaged_one_is_not_used(installed: Path, damage: str, monkeypatch: py
     else:
         os.truncate(folder / cache.MANIFEST_NAME, 100)
     with pytest.warns(RuntimeWarning, match=r"-v1 is damaged and not used; install msfp-gen again"):
-        assert prebuilt.find_prebuilt(SPEC) is None
+        assert build.find_prebuilt(SPEC) is None
 
 
 def test_a_prebuilt_model_is_of_these_sources(installed: Path) -> None:
     (cache.PACKAGE / "runtime" / "unit.c").write_text(fake_model.RUNTIME.replace("2.0", "3.0"))
-    assert prebuilt.find_prebuilt(SPEC) is None
+    assert build.find_prebuilt(SPEC) is None
 
 
 def test_presets_are_among_the_prebuilt_models() -> None:
@@ -106,7 +106,7 @@ def test_presets_are_among_the_prebuilt_models() -> None:
     from msfp_gen.buildings.file import load_scene as load_building
     from msfp_gen.scene.effect_selection import select_effects
 
-    names = {spec.key for spec in prebuilt.prebuilt_specs()}
+    names = {spec.key for spec in build.prebuilt_specs()}
     assert len(names) == 34
     for preset in ("fenz-test1", "becker-circle-50", "single-push", "double-push", "triple-push", "ridgecrest-clc"):
         scene = load_scene(preset)
