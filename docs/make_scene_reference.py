@@ -20,7 +20,8 @@ from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.file import motion_tables, schema
 from msfp_gen.scene.file.motion_tables import LOADS, ROTATIONS, Components, Paths
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.scene_fields import InitialState, Limits, Solver, Stop
+from msfp_gen.scene.scene_fields import InitialState, Limits, Stop
+from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, NodeTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Auto, Layout
 

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene as Scene
     from msfp_gen.scene.scene_fields import InitialState as InitialState
     from msfp_gen.scene.scene_fields import Limits as Limits
-    from msfp_gen.scene.scene_fields import Solver as Solver
     from msfp_gen.scene.scene_fields import Stop as Stop
+    from msfp_gen.scene.solver import Solver as Solver
     from msfp_gen.scene.top import Top as Top
     from msfp_gen.simulation.simulate import simulate as simulate
     from msfp_gen.specification.layout import Auto as Auto
@@ -74,7 +74,7 @@ _MODULES = {
     "RunError": "common.errors",
     "Scene": "scene.scene",
     "Soil": "buildings.storey",
-    "Solver": "scene.scene_fields",
+    "Solver": "scene.solver",
     "Stop": "scene.scene_fields",
     "Storey": "buildings.storey",
     "Surface": "scene.bearing",

@@ -35,7 +35,8 @@ from msfp_gen.results.variables import (
 from msfp_gen.scene.file.loader import bearing_table, dumps, plain_table, toml_table
 from msfp_gen.scene.file.stored_motion import GROUP as MOTION
 from msfp_gen.scene.file.stored_motion import PIECES, to_pieces
-from msfp_gen.scene.scene_fields import Limits, Solver
+from msfp_gen.scene.scene_fields import Limits
+from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,7 +19,8 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
 from msfp_gen.scene.friction_parameters import select_friction
-from msfp_gen.scene.scene_fields import Fidelity, Limits, Solver
+from msfp_gen.scene.scene_fields import Fidelity, Limits
+from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_seats, check_standing, needed_rotational_stiffness
 from msfp_gen.scene.top import NodeTop
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec

@@ -31,7 +31,7 @@ from msfp_gen.cli.console import (
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.fields import to_si
 from msfp_gen.common.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
-from msfp_gen.scene.scene_fields import Solver
+from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.file import AnyScene

@@ -21,7 +21,7 @@ from msfp_gen.motions.prescribed import Rotation
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.friction_parameters import select_friction
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.scene_fields import Solver
+from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop, RigTop
 from msfp_gen.specification.contract import STATUSES, WORKS, names
 from msfp_gen.specification.layout import Auto, Effects

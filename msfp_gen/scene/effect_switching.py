@@ -23,7 +23,8 @@ from msfp_gen.scene.friction_parameters import checked_range, heated_contacts, t
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
-    from msfp_gen.scene.scene_fields import SceneFields, Solver
+    from msfp_gen.scene.scene_fields import SceneFields
+    from msfp_gen.scene.solver import Solver
 
 # The effects that a model needs after a monitor has tripped.
 REQUIRED_EFFECTS: dict[str, dict[str, object]] = {

@@ -26,7 +26,7 @@ from msfp_gen.specification.layout import Effects, Layout
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
-    from msfp_gen.scene.scene_fields import Solver
+    from msfp_gen.scene.solver import Solver
     from msfp_gen.scene.top import Top
 
 

@@ -14,7 +14,8 @@ from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection, select_effects
 from msfp_gen.scene.friction_parameters import check_bearing
 from msfp_gen.scene.planarity import scene_plane
-from msfp_gen.scene.scene_fields import InitialState, Limits, SceneFields, Solver, Stop
+from msfp_gen.scene.scene_fields import InitialState, Limits, SceneFields, Stop
+from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_seats, check_standing, standing_of
 from msfp_gen.scene.top import NodeTop, Top
 from msfp_gen.specification import contract

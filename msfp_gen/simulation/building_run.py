@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from msfp_gen.buildings.scene import BuildingScene
     from msfp_gen.model.compiled import Port
     from msfp_gen.scene.scene import Scene
-    from msfp_gen.scene.scene_fields import Solver
+    from msfp_gen.scene.solver import Solver
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from msfp_gen.model.model import Model
     from msfp_gen.results.history import Event, History
     from msfp_gen.scene.scene import Scene
-    from msfp_gen.scene.scene_fields import Solver
+    from msfp_gen.scene.solver import Solver
     from msfp_gen.simulation.rows import Segment
     from msfp_gen.specification.layout import Effects
 

@@ -29,7 +29,8 @@ from msfp_gen.motions.time_grid import TimeGrid, snapped
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import monitor_options
 from msfp_gen.scene.planarity import scene_plane
-from msfp_gen.scene.scene_fields import InitialState, Solver
+from msfp_gen.scene.scene_fields import InitialState
+from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import load_values
 from msfp_gen.simulation.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.specification.friction_laws import SPIN

@@ -273,7 +273,7 @@ def test_explain_has_a_meaning_for_every_choice():
     from msfp_gen.buildings.explain import METHODS, TOPS
     from msfp_gen.common.fields import Choice, ruled_fields
     from msfp_gen.scene.file.loader import _TOPS
-    from msfp_gen.scene.scene_fields import Solver
+    from msfp_gen.scene.solver import Solver
     from msfp_gen.specification.layout import Effects
 
     hints = get_type_hints(Effects)

@@ -34,7 +34,8 @@ from msfp_gen.scene.file.motion_tables import (
     with_spectrum,
 )
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.scene_fields import InitialState, Limits, Solver, Stop
+from msfp_gen.scene.scene_fields import InitialState, Limits, Stop
+from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, Top
 from msfp_gen.specification.layout import SELECTABLE, Auto, Effects, Layout
 

@@ -33,7 +33,8 @@ from msfp_gen.scene.file import motion_tables
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.scene.file.motion_tables import LOADS, ROTATIONS
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.scene_fields import InitialState, Limits, Solver, Stop
+from msfp_gen.scene.scene_fields import InitialState, Limits, Stop
+from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Auto, Layout
 

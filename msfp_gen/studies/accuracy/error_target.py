@@ -26,7 +26,7 @@ from msfp_gen.studies.accuracy.timed_run import CUT_OFF, Errors, Trial, dopri5_c
 if TYPE_CHECKING:
     from msfp_gen.results.result import Result
     from msfp_gen.scene.scene import Scene
-    from msfp_gen.scene.scene_fields import Solver
+    from msfp_gen.scene.solver import Solver
 
 AFTER_IMPACTS = ", and after impacts,"
 CANDIDATE_TOLERANCES = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21))  # 1e-2, 3e-3, 1e-3 ... 1e-10

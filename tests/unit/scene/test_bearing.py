@@ -7,7 +7,7 @@ import pytest
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.scene.bearing import Bearing, Body, Surface
-from msfp_gen.scene.scene_fields import Solver
+from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, Top
 from msfp_gen.specification.layout import Layout
 

@@ -13,7 +13,8 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.records import bundled
 from msfp_gen.scene.file.loader import dumps, scene_from_table, scene_text
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.scene_fields import InitialState, Solver, Stop
+from msfp_gen.scene.scene_fields import InitialState, Stop
+from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import Top
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 

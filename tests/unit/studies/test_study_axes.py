@@ -20,7 +20,8 @@ from msfp_gen.common.identity import fingerprint
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.file.loader import bearing_table, dumps, plain_values
 from msfp_gen.scene.file.motion_tables import Circle, Harmonic, RecordMotion
-from msfp_gen.scene.scene_fields import Solver, Stop
+from msfp_gen.scene.scene_fields import Stop
+from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, NodeTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Auto
 from msfp_gen.studies import load_study
