@@ -24,10 +24,10 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.scene import Scene
 from msfp_gen.studies import estimate
 from msfp_gen.studies.batch import run_to_end
+from msfp_gen.studies.definition import example_text, load_study
 from msfp_gen.studies.estimation.estimate import Estimate, Question, estimate_table, estimated, fragility_of
 from msfp_gen.studies.estimation.source import StudySource, crossings
 from msfp_gen.studies.pool import pool_from
-from msfp_gen.studies.study.loader import example_text, load_study
 
 sys.path.append(str(Path(__file__).parent))
 from quick import parser, pick

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from msfp_gen.studies.bounding import bound as bound
     from msfp_gen.studies.calibration import Measurement as Measurement
     from msfp_gen.studies.calibration import fit as fit
-    from msfp_gen.studies.study.run import study as study
+    from msfp_gen.studies.run import study as study
 
 # Public name -> the module that defines it; `presets` is a module itself.
 _MODULES = {
@@ -89,7 +89,7 @@ _MODULES = {
     "presets": "scene.file.presets",
     "simulate": "simulation.simulate",
     "simulate_batch": "studies.batch",
-    "study": "studies.study.run",
+    "study": "studies.run",
 }
 
 __all__ = [*_MODULES, "__version__"]

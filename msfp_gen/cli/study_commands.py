@@ -19,8 +19,8 @@ from msfp_gen.common.tables import TABLE_SUFFIXES
 
 if TYPE_CHECKING:
     from msfp_gen.common.tables import Table
-    from msfp_gen.studies.study.definition import Study
-    from msfp_gen.studies.study.run import Outcome
+    from msfp_gen.studies.definition import Study
+    from msfp_gen.studies.run import Outcome
 
 app = typer.Typer()
 
@@ -106,9 +106,9 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Run what is missing of a study, or estimate a statistic of it. Ctrl-C at any time: the same command continues."""
-    from msfp_gen.studies.study.loader import example_text, load_study
-    from msfp_gen.studies.study.run import parsed_shard
-    from msfp_gen.studies.study.run import study as run_study
+    from msfp_gen.studies.definition import example_text, load_study
+    from msfp_gen.studies.run import parsed_shard
+    from msfp_gen.studies.run import study as run_study
 
     if example:
         say(example_text().rstrip("\n"))
@@ -183,7 +183,7 @@ def _report(done: Outcome, output: Path, as_json: bool, judged: bool) -> None:
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study status out\n  msfp-gen study status out --json")
 def status(folder: Folder, as_json: AsJson = False) -> None:
     """How far a study has come, how fast it is, and how long it will still take."""
-    from msfp_gen.studies.study.chunks import status_table, study_status
+    from msfp_gen.studies.run import status_table, study_status
 
     progress = study_status(folder)
     answer(progress.as_dict(), [status_table(progress)], as_json)

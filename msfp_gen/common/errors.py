@@ -5,6 +5,8 @@ A message is one line with the field, its value and a remedy.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -51,6 +53,15 @@ class RunError(MsfpError, RuntimeError):
         self.result = result
         if status == "interrupted":
             self.exit_code = 130
+
+
+@contextmanager
+def prefixed(prefix: str) -> Iterator[None]:
+    """Begin the messages of all InputErrors of the block with a text."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{prefix}{error}") from None
 
 
 def printable(text: str) -> str:

@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from msfp_gen.studies.assessment.sensitivity import plot_tornado as plot_tornado
     from msfp_gen.studies.assessment.sensitivity import sobol as sobol
     from msfp_gen.studies.assessment.sensitivity import tornado as tornado
+    from msfp_gen.studies.definition import load_study as load_study
     from msfp_gen.studies.estimation.estimate import Estimate as Estimate
     from msfp_gen.studies.estimation.estimate import estimate as estimate
     from msfp_gen.studies.estimation.estimate import plot_estimate as plot_estimate
-    from msfp_gen.studies.study.chunks import Status as Status
-    from msfp_gen.studies.study.chunks import study_status as study_status
-    from msfp_gen.studies.study.loader import load_study as load_study
-    from msfp_gen.studies.study.run import Outcome as Outcome
+    from msfp_gen.studies.run import Outcome as Outcome
+    from msfp_gen.studies.run import Status as Status
+    from msfp_gen.studies.run import study_status as study_status
 
 # Public name -> the module that defines it.
 _MODULES = {
-    "Outcome": "study.run",
+    "Outcome": "run",
     "Goals": "assessment.pareto",
     "Estimate": "estimation.estimate",
     "estimate": "estimation.estimate",
@@ -45,9 +45,9 @@ _MODULES = {
     "plot_pareto": "assessment.pareto",
     "plot_sobol": "assessment.sensitivity",
     "plot_tornado": "assessment.sensitivity",
-    "Status": "study.chunks",
-    "load_study": "study.loader",
-    "study_status": "study.chunks",
+    "Status": "run",
+    "load_study": "definition",
+    "study_status": "run",
 }
 
 __all__ = [*_MODULES]

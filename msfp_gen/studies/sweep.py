@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.buildings.file import AnyScene, with_absolute_paths
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.common.errors import InputError, RunError
+from msfp_gen.common.errors import InputError, RunError, prefixed
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.scene.file.changes import keys_of
 from msfp_gen.scene.file.loader import scene_table
+from msfp_gen.studies.axes import Axis, Recipe, SceneFactory, located, motion_of
 from msfp_gen.studies.columns import Counts, Source, catalogue, plain_cell, value_at
-from msfp_gen.studies.study.axes import Axis, Recipe, SceneFactory, located, motion_of
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult
@@ -77,16 +77,12 @@ def variations(
         raise InputError(f"--vary: {prod(map(len, lists))} scenes; give at most {MAX_SCENES} in all")
     names = [*(["record"] if records else []), *paths]
     table, path = scene_table(source)
-    try:
+    with prefixed("" if path is None else f"{path}: "):
         factory, axes = _factory(table, None if path is None else path.parent, fields, records)
         return [
             _variation(source, dict(zip(names, shown, strict=True)), factory.scene(values))
             for shown, values in zip(product(*lists), product(*axes), strict=True)
         ]
-    except InputError as error:
-        if path is None:
-            raise
-        raise InputError(f"{path}: {error}") from None
 
 
 def _factory(

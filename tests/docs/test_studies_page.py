@@ -12,7 +12,7 @@ from support import ROOT
 
 from msfp_gen.cli import main
 from msfp_gen.studies import load_study
-from msfp_gen.studies.study.axes import METHODS
+from msfp_gen.studies.axes import METHODS
 
 PAGE = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)

@@ -35,7 +35,7 @@ from msfp_gen.simulation import checkpoint
 from msfp_gen.studies import load_study, read_study, study_status
 from msfp_gen.studies.bounding.factors import factor_text, load_factors
 from msfp_gen.studies.calibration.measurement import read_measurement
-from msfp_gen.studies.study.loader import example_text
+from msfp_gen.studies.definition import example_text
 
 EXAMPLES = ROOT / "examples"
 # What a module calls that opens a file of the user.
@@ -189,8 +189,8 @@ READERS: dict[str, list[Reader]] = {
         Reader("building.toml", (EXAMPLES / "building" / "building.toml").read_bytes(), load_scene, toml),
         Reader("suite.toml", SUITE, load_suite, toml),
     ],
-    "studies/study/loader.py": [Reader("study.toml", example_text().encode(), load_study, toml)],
-    "studies/study/chunks.py": [Reader("study.toml", FOLDER, read_folder, toml)],
+    "studies/definition.py": [Reader("study.toml", example_text().encode(), load_study, toml)],
+    "studies/run.py": [Reader("study.toml", FOLDER, read_folder, toml)],
     "studies/bounding/factors.py": [Reader("factors.toml", factor_text("asce7").encode(), load_factors, toml)],
     "buildings/building.py": [
         Reader("mass.mtx", MATRIX, lambda path: matrix_of(path, "mass")),

@@ -12,7 +12,7 @@ import numpy as np
 from msfp_gen import Motion, load_scene, simulate
 from msfp_gen.model.plane import motion_in_plane
 from msfp_gen.motions import records
-from msfp_gen.studies.study.axes import Distribution
+from msfp_gen.studies.axes import Distribution
 
 
 def wide_features() -> list[str]:

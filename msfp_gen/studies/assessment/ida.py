@@ -24,7 +24,7 @@ from msfp_gen.studies.assessment.rows import (
     scale_of,
     unit_of,
 )
-from msfp_gen.studies.study.axes import INTENSITY
+from msfp_gen.studies.axes import INTENSITY
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

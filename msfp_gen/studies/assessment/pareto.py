@@ -24,11 +24,10 @@ from msfp_gen.studies.assessment.rows import (
     scale_of,
     write_frame,
 )
+from msfp_gen.studies.axes import Sampling, values_at
+from msfp_gen.studies.definition import Study, load_study
 from msfp_gen.studies.pool import Pool, pool_from, require
-from msfp_gen.studies.study.axes import Sampling, values_at
-from msfp_gen.studies.study.definition import Study
-from msfp_gen.studies.study.loader import load_study
-from msfp_gen.studies.study.run import run_on
+from msfp_gen.studies.run import run_on
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

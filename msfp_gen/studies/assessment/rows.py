@@ -13,7 +13,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import write_columns
 from msfp_gen.figures.style import Scale, engineering
 from msfp_gen.scene.file.catalogue import suggestion
-from msfp_gen.studies.study.chunks import parts_in, readable_parts, study_table
+from msfp_gen.studies.run import parts_in, readable_parts, study_table
 
 SIZE = (6.8, 4.6)  # of a figure [inch]
 COMPLETE = "ok"  # the status of a run that reached its end

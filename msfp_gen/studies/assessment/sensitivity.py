@@ -23,9 +23,9 @@ from msfp_gen.studies.assessment.rows import (
     scale_of,
     unit_of,
 )
+from msfp_gen.studies.axes import Sampling
 from msfp_gen.studies.pool import require
-from msfp_gen.studies.study.axes import Sampling
-from msfp_gen.studies.study.chunks import study_table
+from msfp_gen.studies.run import study_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,7 +9,7 @@ from math import prod
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from msfp_gen.common.errors import InputError
+from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, Text
 from msfp_gen.common.inputs import is_input
 from msfp_gen.scene.file.catalogue import known_keys, parsed, suggestion
@@ -136,10 +136,8 @@ def load_factors(source: str | Path) -> FactorTable:
     path = Path(source)
     if str(source) in _bundled() or not is_input(path):
         return _read(str(source), toml_table(factor_text(str(source))))
-    try:
+    with prefixed(f"{path}: "):
         return _read(path.stem, toml_file(path))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
 
 
 def _bundled() -> dict[str, str]:

@@ -13,7 +13,7 @@ import numpy as np
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.errors import InputError, RunError
+from msfp_gen.common.errors import InputError, RunError, prefixed
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.figures import COLOURS, INK, displacement, displacement_label, engineering, force, page
@@ -252,10 +252,8 @@ def bounded_scene(scene: AnyScene, table: FactorTable, case: str) -> AnyScene:
         requested = mount.effects or Auto()
         formula = requested.friction_law
         word = requested.friction or select_friction(mount.bearing, formula)
-        try:
+        with prefixed(f"{scene.label(index)}: "):
             bearing = _bounded(mount.bearing, law_of(word, formula), table, case)
-        except InputError as error:
-            raise InputError(f"{scene.label(index)}: {error}") from None
         bearings.append(replace(mount, bearing=bearing))
     return scene if case == "nominal" else replace(scene, bearings=bearings, name=label)
 

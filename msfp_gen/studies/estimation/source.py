@@ -21,14 +21,13 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.specification import formula
 from msfp_gen.studies.assessment.rows import numbers, read_study
+from msfp_gen.studies.axes import Sampling, SceneFactory, values_at
 from msfp_gen.studies.columns import Keep
+from msfp_gen.studies.definition import Study
 from msfp_gen.studies.estimation.backbone_run import OF_SURFACES, QUANTITIES, check_backbone
 from msfp_gen.studies.estimation.estimators import EXACT, Flags, Indices
 from msfp_gen.studies.pool import Pool
-from msfp_gen.studies.study.axes import Sampling, SceneFactory, values_at
-from msfp_gen.studies.study.chunks import STUDY_FILE, parts_in, readable_parts, study_table
-from msfp_gen.studies.study.definition import Study
-from msfp_gen.studies.study.run import run_on
+from msfp_gen.studies.run import STUDY_FILE, parts_in, readable_parts, run_on, study_table
 
 BLOCK = 1024  # draws that are made together
 CHUNKS = {EXACT: 4, "backbone": 64}  # runs of a part; of other models
@@ -329,7 +328,7 @@ class Searches:
         self._runs = dict.fromkeys(source.levels, 0)
 
     def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
-        """Logarithms of the intensities at which draws cross; none ends early."""
+        """Logarithms of the intensities at which draws cross, shape (draws,) [-]; none ends early."""
         known = self._values[level]
         new = np.array([draw for draw in draws.tolist() if draw not in known], dtype=np.intp)
         if new.size:

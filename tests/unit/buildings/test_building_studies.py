@@ -16,7 +16,7 @@ from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.cli import main
 from msfp_gen.studies.bounding import bounded_scenes, load_factors
 from msfp_gen.studies.bounding.runs import bounded_scene, bounding_tables, plot_bounds, write_quantities
-from msfp_gen.studies.study.loader import load_study
+from msfp_gen.studies.definition import load_study
 
 TEXT = """
 name = "slab"

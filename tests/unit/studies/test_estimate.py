@@ -14,6 +14,7 @@ from msfp_gen.scene.fidelity import Backbone
 from msfp_gen.scene.file.loader import bearing_from_table
 from msfp_gen.studies import estimate, fragility, ida, read_study
 from msfp_gen.studies.batch import run_to_end
+from msfp_gen.studies.definition import example_text
 from msfp_gen.studies.estimation.backbone_run import parallel
 from msfp_gen.studies.estimation.estimate import Question, estimate_table, estimated, fragility_of, plot_estimate
 from msfp_gen.studies.estimation.estimators import (
@@ -27,7 +28,6 @@ from msfp_gen.studies.estimation.estimators import (
     work_of,
 )
 from msfp_gen.studies.estimation.source import crossings
-from msfp_gen.studies.study.loader import example_text
 
 SPREAD, NOISE = 0.5, 0.1  # standard deviation of the logarithm, and share of it that the cheap model does not see
 

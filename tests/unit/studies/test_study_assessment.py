@@ -254,7 +254,7 @@ def test_sensitivity_needs_its_sampling_and_all_runs(one_at_a_time: Path, tmp_pa
 def test_sobol_indices_are_those_of_ishigami(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The rows of the sampling, in the order that SALib analyses; the function has known indices."""
     pytest.importorskip("SALib")
-    from msfp_gen.studies.study.axes import Sampling
+    from msfp_gen.studies.axes import Sampling
 
     shares = Sampling("sobol-indices", 4096, seed=1).shares(3)
     x = np.pi * (2 * shares - 1)

@@ -19,9 +19,9 @@ from msfp_gen.motions.records.spectrum import MEASURES
 from msfp_gen.scene.file.loader import scene_from_table, toml_file
 from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.studies import load_study
+from msfp_gen.studies.axes import METHODS, Distribution, Sampling
 from msfp_gen.studies.columns import Counts, Keep, catalogue
-from msfp_gen.studies.study.axes import METHODS, Distribution, Sampling
-from msfp_gen.studies.study.loader import example_text
+from msfp_gen.studies.definition import example_text
 
 
 def values_of(study: Any, run: int) -> tuple[Any, ...]:
@@ -317,7 +317,7 @@ def test_a_file_is_named_in_its_errors(tmp_path: Any) -> None:
         load_study(path)
     with pytest.raises(InputError, match=r"no such file; `msfp-gen study --example`"):
         load_study(tmp_path / "none.toml")
-    assert (ROOT / "msfp_gen/studies/study/example.toml").is_file()
+    assert (ROOT / "msfp_gen/studies/example.toml").is_file()
 
 
 def test_a_residual_displacement_without_rest_has_its_reason() -> None:

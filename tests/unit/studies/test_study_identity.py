@@ -23,7 +23,7 @@ from msfp_gen.scene.file.catalogue import scene_table
 from msfp_gen.scene.file.loader import dumps
 from msfp_gen.studies import load_study
 from msfp_gen.studies.bounding.factors import factor_text
-from msfp_gen.studies.study.chunks import Chunks
+from msfp_gen.studies.run import Chunks
 
 SHORT = {  # a run of a few milliseconds
     **scene_table("fenz-test1"),

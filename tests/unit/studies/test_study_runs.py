@@ -20,7 +20,7 @@ from support.study_tables import cheap_study, rows_of
 import msfp_gen
 from msfp_gen import InputError, RunError, simulate
 from msfp_gen.studies import load_study, read_study, study_status
-from msfp_gen.studies.study import run as running
+from msfp_gen.studies import run as running
 
 LONG = {  # a run of about a minute
     "bearing": "fenz-tfp",

@@ -1,6 +1,7 @@
-"""Chunks of a study, their files in its folder, and how far it has come.
+"""`study`: runs what is missing of a study, on any engine: each chunk in a worker, whose rows are kept as it ends.
 
-Each part is named after a digest of everything that determines its rows.
+A chunk is a file in the folder of the study, its part, named after a digest of everything that determines its rows. The
+files tell how far a study has come.
 """
 
 from __future__ import annotations
@@ -8,32 +9,219 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.common.errors import InputError
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.identity import fingerprint
-from msfp_gen.common.output import clear_all_leftovers, write_bytes
-from msfp_gen.common.tables import Table
+from msfp_gen.common.inputs import Files, expecting
+from msfp_gen.common.output import clear_all_leftovers, make_folder, write_bytes
+from msfp_gen.common.tables import Table, parquet_bytes
 from msfp_gen.common.version import __version__
 from msfp_gen.jit.cache import digest_sources
 from msfp_gen.scene.file.loader import dumps, toml_file
-from msfp_gen.studies.study.definition import Study, Task
+from msfp_gen.studies.axes import INTENSITY, Recipe, SceneFactory
+from msfp_gen.studies.batch import BAD_INPUT, ENDED, OUT_OF_TIME, build_models, check_method, run_to_end
+from msfp_gen.studies.columns import Column, Keep
+from msfp_gen.studies.definition import Study, Task, load_study
+from msfp_gen.studies.pool import Pool, pool_from
 
+if TYPE_CHECKING:
+    from msfp_gen.buildings.file import AnyScene
+
+Progress = Callable[[int, int], None]
 FORMAT = 1  # of the rows of a part
 STUDY_FILE = "study.toml"
 PARTS = "part-*.parquet"
 _NAME = re.compile(r"part-(\d{7})-[0-9a-f]{16}\.parquet")
 IDLE = 3  # times the longest interval between parts, after which a study counts as not running
 LEAST_IDLE = 10.0  # that time at least [s]
+
+
+class Outcome(NamedTuple):
+    """What a call of `study` did: runs (of the shard), done before, done now, and failed in all."""
+
+    runs: int
+    before: int
+    done: int
+    failed: int
+
+
+def study(
+    source: Study | str | Path | Mapping[str, Any],
+    output: str | Path,
+    *,
+    workers: int | None = None,
+    threads: bool = False,
+    executor: Executor | None = None,
+    dask: str | None = None,
+    mpi: bool = False,
+    shard: tuple[int, int] = (1, 1),
+    progress: Progress | None = None,
+) -> Outcome:
+    """Run a study: what is missing in its folder is computed, and each chunk is one Parquet file there.
+
+    The same call continues a study that was interrupted, at any time and by anything; a chunk per worker is lost at
+    most. A run that fails is a row with its status and message. With processes, a script must make this call under
+    `if __name__ == "__main__":`.
+
+    source: a study file (docs/studies.md), a table of the same keys, or a `Study`. output: the folder of the study:
+    `part-*.parquet` and `study.toml`; it is made if it does not exist. workers: runs at the same time; None: one for
+    each core. threads: in place of processes: they start at once, and suit few and long runs. executor: an executor
+    (`concurrent.futures`) to run on, such as that of Parsl; it stays open. dask: address or scheduler file of a Dask
+    cluster to run on. mpi: run on the other processes of `mpiexec ... -m mpi4py.futures`. shard: (i, n): only every
+    n-th chunk, from the i-th; for job arrays that share `output`. progress: called with the runs that are done,
+    earlier ones included, and all (of the shard).
+
+    Raises InputError: invalid input, or a folder with another study; nothing was computed; RunError: workers died, or
+    more runs failed than `limits.failures` permits. What is done is kept.
+    """
+    _check_shard(shard)
+    definition = source if isinstance(source, Study) else load_study(source)
+    with pool_from(workers, threads, executor, dask, mpi) as pool:
+        return run_on(pool, definition, Path(output), shard, progress)
+
+
+def run_on(
+    pool: Pool, study: Study, folder: Path, shard: tuple[int, int] = (1, 1), progress: Progress | None = None
+) -> Outcome:
+    """Compute what is missing of a study on a pool. Arguments and errors are those of `study`."""
+    make_folder(folder, "output")
+    chunks = chunks_in(study, folder)
+    chunks.open()
+    study, present = chunks.study, set(parts_in(chunks.folder))
+    numbers = range(shard[0] - 1, study.chunks, shard[1])
+    total, missing, before, failed = 0, [], 0, 0
+    for task in map(study.task, numbers):
+        total += len(task)
+        if (path := chunks.path(task)).name in present:
+            before, failed = before + len(task), failed + failures(path)
+        else:
+            missing.append(task.number)
+    _check_failures(study, failed, before, chunks.folder)
+    if missing:
+        build_models([study.scene(1)])  # local workers find its model in the cache; other hosts build their own
+        chunks.started()
+    if progress is not None:
+        progress(before, total)
+    done = 0
+    timed = "listed" in study.table.get("accuracy", {})
+    common = study.recipe, study.files, study.keep, study.limits.run_seconds
+    order = Order(chunks.identity, chunks.digest, *common, timed)
+    calls = ((task, (order, task)) for task in map(study.task, missing))
+    for task, (part, bad) in pool.results(run_chunk, calls):
+        write_bytes(chunks.path(task), [part], tidy=False)
+        done, failed = done + len(task), failed + bad
+        if progress is not None:
+            progress(before + done, total)
+        _check_failures(study, failed, before + done, chunks.folder)
+    return Outcome(total, before, done, failed)
+
+
+def parsed_shard(text: str) -> tuple[int, int]:
+    """(i, n) of a text i/n. Raises InputError."""
+    first, _, count = text.partition("/")
+    try:
+        shard = int(first), int(count)
+    except ValueError:
+        raise InputError(f"--shard = {text!r}: give i/n, such as 3/16 for the third of 16 jobs") from None
+    _check_shard(shard)
+    return shard
+
+
+def _check_shard(shard: tuple[int, int]) -> None:
+    numbers = tuple(shard) if isinstance(shard, Sequence) else ()
+    if len(numbers) != 2 or not all(isinstance(n, int) for n in numbers) or not 1 <= numbers[0] <= numbers[1]:
+        raise InputError(f"shard = {'/'.join(map(str, numbers)) or shard!r}: give i/n with i from 1 to n")
+
+
+def _check_failures(study: Study, failed: int, done: int, folder: Path) -> None:
+    """Raise RunError where more runs have failed than the study permits."""
+    limit = study.limits.failures
+    if limit is not None and failed > limit:
+        raise RunError(
+            f"{failed} of {done} runs failed, more than limits.failures = {limit}; see the column message in {folder}, "
+            "where they are kept"
+        )
+
+
+class Order(NamedTuple):
+    """What workers need for any chunk of a study.
+
+    identity: of the whole study. digest: of what its parts have in common. files: path -> sha256 of those that its
+    scenes open. timed: whether parts state their seconds, for an estimate; otherwise equal rows have equal bytes.
+    """
+
+    identity: str
+    digest: str
+    recipe: Recipe
+    files: Files
+    keep: Keep
+    run_seconds: float | None
+    timed: bool = False
+
+
+_factories: dict[str, SceneFactory] = {}  # of the last study only
+
+
+def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
+    """The part of a chunk as the bytes of a Parquet file, and how many of its runs failed.
+
+    Raises ChangedFileError where a file is not as it was when the study was checked.
+    """
+    with expecting(order.files):
+        factory = _factories.get(order.identity)
+        if factory is None:
+            factory = SceneFactory(order.recipe)
+            _factories.clear()
+            _factories[order.identity] = factory
+        begin = time.thread_time()
+        axes = order.recipe.axes
+        rows = []
+        for offset, (values, labels) in enumerate(task.rows(axes), start=1):
+            at = {axis.name: label for axis, label in zip(axes, labels, strict=True)}
+            intensity = order.recipe.intensity(at)
+            numbers = {**{axis.name: at[axis.name] for axis in axes if axis.numeric}, **intensity}
+            status, message, kept = _row(partial(factory.scene, values), order, numbers)
+            rows.append({"run": task.first + offset, **at, "status": status, "message": message, **intensity, **kept})
+    failed = sum(row["status"] not in ENDED for row in rows)
+    seconds = time.thread_time() - begin
+    return _part(order, rows, failed, {"seconds": f"{seconds:.4g}"} if order.timed else {}), failed
+
+
+def _row(make: Callable[[], AnyScene], order: Order, at: dict[str, float]) -> tuple[str, str, dict[str, Any]]:
+    """Status, message and quantities of one run."""
+    try:
+        scene = make()
+        check_method(scene)
+        result = run_to_end(scene, seconds=order.run_seconds)
+    except InputError as error:
+        return BAD_INPUT, str(error), {}
+    except RunError as error:  # without rows, or with those that a slow computer reaches
+        remedy = "; see limits.run_seconds" if error.status == OUT_OF_TIME else ""
+        return error.status, f"{error}{remedy}", {}
+    kept, problem = order.keep.values(result, at)
+    return result.status, result.message or problem, kept
+
+
+def _part(order: Order, rows: list[dict[str, Any]], failed: int, more: dict[str, str]) -> bytes:
+    """The columns of every part: run, axes, status, message, intensity, quantities. more: metadata."""
+    axes = [Column(axis.name, "", not axis.numeric) for axis in order.recipe.axes]
+    intensity = [Column(INTENSITY, "m/s^2")] if order.recipe.intensities else []
+    texts = [Column("status", "", text=True), Column("message", "", text=True)]
+    columns = [*axes, *texts, *intensity, *order.keep.columns()]
+    types = {"run": "int64", **{name: "string" if text else "double" for name, _, text in columns}}
+    values = {(name, unit): [row.get(name) for row in rows] for name, unit, _ in (Column("run", ""), *columns)}
+    return parquet_bytes(values, types, {"digest": order.digest, "failed": str(failed), **more})
 
 
 class Chunks:
@@ -146,7 +334,11 @@ class Chunks:
         old = _read(self.folder)
         new = {"about": {}, **self.study.table, "chunk": self.study.chunk}
         return next(
-            (f"{key} differs" for key in (*new, *old) if key != "about" and _text(old.get(key)) != _text(new.get(key))),
+            (
+                f"{key} differs"
+                for key in (*new, *old)
+                if key != "about" and dumps({key: old.get(key)}) != dumps({key: new.get(key)})
+            ),
             "its files or the equations have changed",
         )
 
@@ -157,10 +349,6 @@ def chunks_in(study: Study, folder: Path) -> Chunks:
     if study.given_chunk is None and isinstance(size, int) and size > 0 and parts_in(folder):
         study = replace(study, given_chunk=size)
     return Chunks(study, folder)
-
-
-def _text(value: Any) -> str:
-    return dumps({"value": value})
 
 
 def parts_in(folder: Path) -> dict[str, int]:

@@ -19,7 +19,7 @@ import numpy as np
 from msfp_gen.buildings.file import AnyScene, located_value, reduced, scene_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.elementary import exp
-from msfp_gen.common.errors import InputError
+from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.scene.file.catalogue import parsed, suggestion
 from msfp_gen.scene.file.changes import changed_table, keys_of, multiplied_table
@@ -280,20 +280,18 @@ class Axis:
         return self.random or all(isinstance(label, float) for label in self.labels)
 
 
-def axis_from(name: str, table: Any) -> Axis:
-    """The axis of a table `[axes.NAME]`. Raises InputError of one line that starts with `axes.NAME`."""
+def axis_from(name: str, table: Any, folder: Path | None) -> Axis:
+    """The axis of a table `[axes.NAME]` of a study file in a folder. Raises InputError that starts with `axes.NAME`."""
     path = f"axes.{name}"
     if not isinstance(table, Mapping):
         raise InputError(f"{path} = {table!r}: give a table, such as sets = 'bearing.friction', values = [0.05, 0.08]")
     if not re.fullmatch(r"[^\W\d]\w*", name) or name in RESERVED:
         why = "the table has such a column" if name in RESERVED else "a name has letters, digits and _ only"
         raise InputError(f"{path}: {why}; give another name")
-    try:
+    with prefixed(f"{path}."):
         change, paths = _change(table)
         axis = Axis(name, change, paths, _surfaces(table))
         complete, used = _with_values(axis, table)
-    except InputError as error:
-        raise InputError(f"{path}.{error}") from None
     known = {*used, "sets", "multiplies", "factors", "surfaces"}
     if extra := [key for key in table if key not in known]:
         everything = {*KEYS, "between", "low", "mode", "high", "mean", "deviation", "median", "dispersion"}
@@ -301,7 +299,8 @@ def axis_from(name: str, table: Any) -> Axis:
             raise InputError(f"{path}.{extra[0]}: not together with {', '.join(sorted(used))}; leave one out")
         hint = suggestion(extra[0], sorted(everything)) or f"; the keys here are {', '.join(KEYS)}"
         raise InputError(f"{path}.{extra[0]}: unknown key{hint}")
-    return complete
+    with prefixed(f"{path}: "):
+        return located(complete, folder)
 
 
 def _change(table: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:

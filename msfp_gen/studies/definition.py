@@ -1,0 +1,520 @@
+"""`Study`: the definition of a study, from a file (TOML) or a table, complete and checked before the first run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from importlib import resources
+from math import prod
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from msfp_gen.buildings import dataset as building_dataset
+from msfp_gen.buildings.file import AnyScene, with_absolute_paths
+from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError, prefixed
+from msfp_gen.common.fields import Choice, Quantity, check_fields, ruled_fields
+from msfp_gen.common.identity import fingerprint
+from msfp_gen.common.inputs import Files, expecting, is_input, recording
+from msfp_gen.results import dataset
+from msfp_gen.scene.file.catalogue import known_keys, parsed
+from msfp_gen.scene.file.changes import multiplied_table
+from msfp_gen.scene.file.loader import Suite, load_suite, scene_table, suite_from_table, toml_file
+from msfp_gen.studies.axes import (
+    INTENSITY,
+    Axis,
+    Distribution,
+    Recipe,
+    Sampling,
+    SceneFactory,
+    axis_from,
+    grid,
+    motion_of,
+)
+from msfp_gen.studies.batch import check_method
+from msfp_gen.studies.bounding import load_factors
+from msfp_gen.studies.columns import Counts, Keep
+
+if TYPE_CHECKING:
+    from msfp_gen.motions.motion import Motion
+
+Table = dict[str, Any]
+Progress = Callable[[float, float], None]
+MOST_RUNS = 100_000_000
+
+TRIED = 1000  # numbers of one axis that are tried before the first run, at least; of texts and tables all
+PARTS = 64  # that a small study has at least, unless these would have fewer than LEAST runs
+LEAST, MOST = 8, 256  # runs of a chunk where the study file does not say
+RECORD_KEYS = ("suite", "motions", "scales", "intensity")
+NOUN = "a table with motions or the file of a suite, and scales"
+COMPONENTS = ("E1", "E2", "E3", "geomean", "rotd50", "rotd100")
+KEYS = {
+    "name": "a text",
+    "scene": "a scene file, the name of a preset, or a table",
+    "records": NOUN,
+    "axes": "a table with one table for each axis",
+    "sampling": "a table: how random axes are drawn",
+    "keep": "a list of quantities",
+    "quantities": "a table of names and formulas",
+    "limits": "a table",
+    "accuracy": "a table: what is estimated, and how well",
+    "chunk": "a number of runs",
+    "about": "written by msfp-gen",
+}
+DEFAULT_KEEP = ("peak_displacement", "peak_force", "peak_sliding", "rims_met", "limits_exceeded")
+BUILDING_KEEP = (
+    "peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "minimum_load_ratio",
+    "limits_exceeded",
+)  # fmt: skip
+_CHUNK = Quantity("", least=1, whole=True)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of a study.
+
+    run_seconds: wall time of one run, after which it ends with status `limit` [s]. failures: runs that may fail; with
+    more the study ends, which keeps what is done. None: no limit. Raises InputError.
+    """
+
+    run_seconds: Annotated[float | None, Quantity("s", above=0.0)] = None
+    failures: Annotated[int | None, Quantity("", least=0, whole=True)] = None
+
+    def __post_init__(self) -> None:
+        check_fields(self, "limits")
+
+
+@dataclass(frozen=True)
+class Task:
+    """The runs of one chunk, as workers receive them.
+
+    Attributes:
+        number: of the chunk, from 0.
+        first: index of its first run, from 0.
+        codes: of each grid axis, ndarray, shape (runs,): the indices of its values.
+        drawn: values of the random axes, ndarray, shape (runs, random axes), [units of the axes].
+    """
+
+    number: int
+    first: int
+    codes: tuple[np.ndarray[Any, np.dtype[np.intp]], ...]
+    drawn: Array
+
+    def __len__(self) -> int:
+        return len(self.drawn)
+
+    def rows(self, axes: Sequence[Axis]) -> list[tuple[tuple[Any, ...], tuple[Any, ...]]]:
+        """Of every run the values of the axes, and what the table shows for them."""
+        codes, drawn = iter(self.codes), iter(self.drawn.T)
+        values: list[Sequence[Any]] = []
+        labels: list[Sequence[Any]] = []
+        for axis in axes:
+            if axis.values is None:
+                values.append(next(drawn).tolist())
+                labels.append(values[-1])
+            else:
+                chosen = next(codes).tolist()
+                values.append([axis.values[code] for code in chosen])
+                labels.append([axis.labels[code] for code in chosen])
+        if not axes:
+            return [((), ())] * len(self)
+        return list(zip(zip(*values, strict=True), zip(*labels, strict=True), strict=True))
+
+
+@dataclass(frozen=True)
+class Study:
+    """The definition of a study.
+
+    Attributes:
+        name: a label.
+        recipe: base scene, axes and records.
+        sampling: how the random axes are drawn; None without random axes.
+        keep: the quantities of each run.
+        limits: of a run, and of the study.
+        given_chunk: runs of a chunk; None: from the number of runs.
+        table: the study as a plain table, complete: scene and records are in it.
+        files: path -> sha256 of every file that was opened to make the scenes of every value.
+        base: fingerprint of the scene of the first run, with the files that were opened for it.
+        opened: (index of an axis, index of its value) -> fingerprint of the files that were opened beyond these.
+    """
+
+    name: str
+    recipe: Recipe
+    sampling: Sampling | None
+    keep: Keep
+    limits: Limits
+    given_chunk: int | None
+    table: dict[str, Any]
+    files: Files = field(default_factory=dict)
+    base: str = ""
+    opened: dict[tuple[int, int], str] = field(default_factory=dict)
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """The axes, in the order of the columns of the table."""
+        return self.recipe.axes
+
+    @property
+    def distributions(self) -> list[Distribution]:
+        """Those of the random axes."""
+        return [axis.distribution for axis in self.axes if axis.distribution is not None]
+
+    @cached_property
+    def samples(self) -> Array:
+        """Values of the random axes, ndarray, shape (samples, axes), [units of the axes]; one row without any."""
+        return np.zeros((1, 0)) if self.sampling is None else self.sampling.drawn(self.distributions)
+
+    @cached_property
+    def grid(self) -> tuple[int, ...]:
+        """Numbers of values of the axes that have some, slowest first."""
+        return tuple(len(axis.values) for axis in self.axes if axis.values is not None)
+
+    @cached_property
+    def cells(self) -> np.ndarray[Any, np.dtype[np.intp]] | None:
+        """The combination of values of each sample, from 0, shape (samples,); None: every sample has all of them."""
+        cells = None if self.sampling is None else self.sampling.cells
+        return None if cells is None else np.array(cells, dtype=np.intp) - 1
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the grid of runs, slowest first: one for each axis with values, then the samples."""
+        return (len(self.samples),) if self.cells is not None else (*self.grid, len(self.samples))
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return prod(self.shape)
+
+    @property
+    def chunk(self) -> int:
+        """Runs of a chunk."""
+        if self.given_chunk is not None:
+            return self.given_chunk
+        wanted = max(self.runs // PARTS, 1)
+        return min(max(1 << (wanted.bit_length() - 1), LEAST), MOST)
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return -(-self.runs // self.chunk)
+
+    def task(self, number: int) -> Task:
+        """The runs of a chunk, numbered from 0."""
+        first = number * self.chunk
+        *codes, sample = np.unravel_index(np.arange(first, min(first + self.chunk, self.runs)), self.shape)
+        if self.cells is not None:
+            codes = list(np.unravel_index(self.cells[sample], self.grid)) if self.grid else []
+        return Task(number, first, tuple(codes), self.samples[sample])
+
+    def scene(self, run: int) -> AnyScene:
+        """The scene of a run, numbered from 1 as in the table, to look at it alone. Raises InputError."""
+        if not 1 <= run <= self.runs:
+            raise InputError(f"run = {run}: give a number from 1 to {self.runs}")
+        number, row = divmod(run - 1, self.chunk)
+        values, _ = self.task(number).rows(self.axes)[row]
+        with expecting(self.files):
+            scene = SceneFactory(self.recipe).scene(values)
+        return replace(scene, name=f"{self.name or 'study'}, run {run}")
+
+
+def check_study(study: Study) -> Study:
+    """The study with its quantities fitted to its bearings, and with the files that its scenes open. Raises InputError:
+    a value that a scene does not accept, names that occur twice, or too many runs.
+
+    Every text and table among the values of a grid, and the least and the largest number of an axis, is tried in the
+    base scene.
+    """
+    if study.runs > MOST_RUNS:
+        raise InputError(f"axes: {study.runs} runs; give at most {MOST_RUNS}")
+    if study.cells is not None and study.cells.max() >= prod(study.grid):
+        raise InputError(f"sampling.cells has {study.cells.max() + 1}: the axes have {prod(study.grid)} combinations")
+    with recording() as files:
+        study = _tried_study(replace(study, files=files))
+    reserved = [INTENSITY] if study.recipe.intensities else []
+    names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in study.keep.columns())]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InputError(f"{twice[0]}: this name occurs twice among axes, keep and quantities; give another")
+    return study
+
+
+def _tried_study(study: Study) -> Study:
+    """The study after all that `check_study` tries."""
+    with prefixed("scene: "):
+        factory = SceneFactory(study.recipe)
+    for axis in study.axes:
+        with prefixed(f"axes.{axis.name}."):
+            _check_axis(axis, factory, bool(study.recipe.records))
+    counts = Counts()
+    columns: dict[str, None] = {}
+    first, base, opened = {}, "", {}
+    for place, scene, files in _tried(study, factory):  # one after the other: their motions are long
+        if place is None:
+            first, base = files, fingerprint((scene, sorted(files.values())))
+        elif own := sorted(digest for path, digest in files.items() if path not in first):
+            opened[place] = fingerprint(own)
+        counts = counts.or_more(Counts.of(scene))
+        if study.keep.formulas:
+            history = building_dataset if isinstance(scene, BuildingScene) else dataset
+            columns |= dict.fromkeys(history.columns(scene))
+    keep = replace(study.keep, counts=counts, history=tuple(columns))
+    return replace(study, keep=keep, base=base, opened=opened)
+
+
+def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:
+    """Raise InputError where an axis cannot change the base scene."""
+    for path in axis.paths if axis.change in ("sets", "multiplies") else ():
+        if path.partition(".")[0] == "motion" and has_records:
+            raise InputError(f"{axis.change} = {path!r}: [records] gives the motion; change it there")
+        try:
+            if axis.change == "multiplies" or axis.surfaces is not None:
+                multiplied_table(factory.recipe.scene, path, 1.0, axis.surfaces)
+        except InputError as error:
+            raise InputError(f"{axis.change} = {path!r}: {str(error).removeprefix(f'{path}: ')}") from None
+    count = min(len(bearing.surfaces) for bearing in factory.base.every_bearing)
+    for surface in axis.surfaces or ():
+        if surface > count:
+            raise InputError(f"surfaces has {surface}: this bearing has surfaces 1 to {count}")
+
+
+def _tried(study: Study, factory: SceneFactory) -> Iterator[tuple[tuple[int, int] | None, AnyScene, Files]]:
+    """The scenes of the first run, and of every value of each axis with the first values of the others.
+
+    Yields the indices of the axis and of its value, None for the first run; the scene, and the files that it opened.
+    """
+    (base, _), *_ = study.task(0).rows(study.axes)
+    named = ", ".join(f"{axis.name} = {value!r:.40}" for axis, value in zip(study.axes, base, strict=True))
+    yield None, *_made(factory, base, f"run 1 ({named})")
+    drawn = iter(study.samples.T)
+    for index, axis in enumerate(study.axes):
+        if axis.values is None:
+            column = next(drawn)
+            tried: list[tuple[int, Any]] = list(enumerate(sorted({float(column.min()), float(column.max())})))
+        else:
+            numeric = all(isinstance(value, int | float) for value in axis.values)
+            tried = list(enumerate(axis.values))[:: max(1, len(axis.values) // TRIED) if numeric else 1]
+        for place, value in tried:
+            changed = (*base[:index], value, *base[index + 1 :])
+            yield (index, place), *_made(factory, changed, f"axes.{axis.name}: value {value!r}")
+
+
+def _made(factory: SceneFactory, values: Sequence[Any], where: str) -> tuple[AnyScene, Files]:
+    with prefixed(f"{where}: "):
+        with recording() as files:
+            scene = factory.scene(values)
+        check_method(scene)
+    return scene, files
+
+
+def fields_of(table: Mapping[str, Any], key: str, kind: type, where: str = "") -> dict[str, Any]:
+    """The table at `key`, whose keys are fields of `kind`; empty if it is not there. Raises InputError."""
+    inner = table.get(key, {})
+    if not isinstance(inner, Mapping):
+        raise InputError(f"{where}{key} = {inner!r}: give a table")
+    known_keys(inner, [name for name, _, _ in ruled_fields(kind)], f"{where}{key}.")
+    return dict(inner)
+
+
+@dataclass(frozen=True)
+class Intensity:
+    """The intensity measure of a record: spectral pseudo-acceleration, or peak ground acceleration without a period.
+
+    period [s], damping: of the oscillator. component: of the spectrum. Raises InputError.
+    """
+
+    period: Annotated[float | None, Quantity("s", above=0.0)] = None
+    damping: Annotated[float, Quantity("", above=0.0)] = 0.05
+    component: Annotated[str, Choice(COMPONENTS)] = "geomean"
+
+    def __post_init__(self) -> None:
+        check_fields(self, "records.intensity")
+
+    def of(self, motion: Motion) -> float:
+        """The measure of a motion [m/s^2]."""
+        from msfp_gen.motions.records.spectrum import MEASURES, response_spectrum
+
+        spectrum = response_spectrum(motion, [self.period or 1.0], damping=self.damping)
+        values = spectrum.pga if self.period is None else spectrum.psa[0]
+        return float(values[MEASURES.index(self.component)])
+
+
+def _records(
+    table: Any, folder: Path | None, progress: Progress | None
+) -> tuple[list[Axis], dict[str, Table], dict[str, float], Table]:
+    """What a table `[records]` gives; all empty for None. folder: of the study file. Raises InputError.
+
+    The axes `record`, and `scale` where scales are given; name -> `[motion]` table, without its key `kind`, with
+    absolute paths; name -> intensity measure at scale 1 [m/s^2], empty where none is asked for; and `[records]` with
+    the motions in it.
+    """
+    if table is None:
+        return [], {}, {}, {}
+    if not isinstance(table, Mapping):
+        raise InputError(f"records = {table!r}: give {NOUN}")
+    known_keys(table, RECORD_KEYS, "records.")
+    suite = _suite(table, folder, progress)
+    axes = [grid(Axis("record", "record"), [record.name for record in suite.records])]
+    if (scales := table.get("scales")) is not None:
+        with prefixed("records.scales: "):
+            axes.append(grid(Axis("scale", "scale"), scales))
+        if not axes[1].numeric or min(axes[1].labels) <= 0:
+            raise InputError(f"records.scales = {scales!r}: give numbers above 0")
+    tables = {record.name: record.table for record in suite.records}
+    intensities = {}
+    if "intensity" in table:
+        measure = Intensity(**fields_of(table, "intensity", Intensity, "records."))
+        intensities = {record.name: measure.of(record.motion) for record in suite.records}
+        if weak := [name for name, value in intensities.items() if not value > 0]:
+            raise InputError(f"records.intensity: record {weak[0]!r} has none in this component; give another")
+    complete = {"motions": [*tables.values()], "scales": scales, "intensity": table.get("intensity")}
+    return axes, tables, intensities, complete
+
+
+def _suite(table: Mapping[str, Any], folder: Path | None, progress: Progress | None) -> Suite:
+    if ("suite" in table) == ("motions" in table):
+        raise InputError("records: give suite, the path of a suite file, or motions, a list of [[records.motions]]")
+    if "suite" in table:
+        if not isinstance(table["suite"], str):
+            raise InputError(f"records.suite = {table['suite']!r}: give a path in quotes")
+        path = (folder or Path()) / table["suite"]
+        return load_suite(path if is_input(path) else table["suite"], progress)
+    with prefixed("records.motions: "):
+        return suite_from_table({"records": table["motions"]}, folder, progress)
+
+
+def example_text() -> str:
+    """A small study file, to start from: a few hundred runs."""
+    return (resources.files(__package__) / "example.toml").read_text(encoding="utf-8")
+
+
+def load_study(
+    source: str | Path | Mapping[str, Any], progress: Progress | None = None, *, design: bool = False
+) -> Study:
+    """The study in a TOML file, or of a table of the same keys. Paths in a file are relative to it.
+
+    progress: of the scaling of a suite of records. design: whether to try both ends of each random axis in place of
+    `[sampling]`, as the start of a search. Raises InputError of one line that names the file, the path of the
+    field, the value and the remedy.
+    """
+    if isinstance(source, Mapping):
+        return _study(source, None, progress, design)
+    path = Path(source)
+    if not is_input(path):
+        raise InputError(f"study = {str(source)!r}: no such file; `msfp-gen study --example` prints one to start from")
+    with prefixed(f"{path}: "):
+        return _study(toml_file(path), path.parent, progress, design)
+
+
+def _for_search(table: Mapping[str, Any]) -> Table:
+    """A study that tries its axes at both ends: what cannot be designed is found before the search."""
+    ends = {"method": "one-at-a-time", "quantiles": [1e-9, 1 - 1e-9]}
+    random = any(isinstance(axis, Mapping) and "distribution" in axis for axis in _table(table, "axes").values())
+    rest = {key: value for key, value in table.items() if key != "sampling"}
+    return {**rest, "sampling": ends} if random else rest
+
+
+def _study(table: Mapping[str, Any], folder: Path | None, progress: Progress | None, design: bool) -> Study:
+    table = _for_search(table) if design else table
+    known_keys(table, KEYS, "")
+    if "scene" not in table:
+        raise InputError(f"scene is missing: give {KEYS['scene']}")
+    with recording():  # a file that changes from here to the end of the check is an error
+        return _checked(table, folder, progress)
+
+
+def _checked(table: Mapping[str, Any], folder: Path | None, progress: Progress | None) -> Study:
+    scene = _scene(table["scene"], folder)
+    of_records, tables, intensities, record_table = _records(table.get("records"), folder, progress)
+    own = [axis_from(name, axis, folder) for name, axis in _table(table, "axes").items()]
+    axes = (*of_records, *own)
+    if len({axis.name for axis in axes}) < len(axes):
+        raise InputError("axes: [records] makes the axes record and scale; give other names")
+    sampling = _sampling(table, axes)
+    keep = Keep(
+        _texts(table, "keep", BUILDING_KEEP if "building" in scene else DEFAULT_KEEP),
+        tuple((name, _formula(name, text)) for name, text in _table(table, "quantities").items()),
+        (*(axis.name for axis in axes if axis.numeric), *([INTENSITY] if intensities else [])),
+    )
+    if tables and "motion" not in scene:
+        scene = {**scene, "motion": motion_of(next(iter(tables.values())))}
+    factors = {
+        path: load_factors(_beside(path, folder)) for axis in axes if axis.change == "factors" for path in axis.paths
+    }
+    complete = {
+        **{key: value for key, value in table.items() if key != "about"},
+        "scene": scene,
+        **({"records": record_table} if tables else {}),
+        **({"axes": {axis.name: _complete(axis, table["axes"][axis.name]) for axis in own}} if own else {}),
+    }
+    return check_study(
+        Study(
+            name=str(table.get("name", "")),
+            recipe=Recipe(scene, axes, tables, factors, intensities),
+            sampling=sampling,
+            keep=keep,
+            limits=Limits(**fields_of(table, "limits", Limits)),
+            given_chunk=None if table.get("chunk") is None else parsed(_CHUNK, table["chunk"], "chunk"),
+            table=complete,
+        )
+    )
+
+
+def _complete(axis: Axis, table: Table) -> Table:
+    """The table of an axis for the copy of the study: with the paths of its values and the labels that these had."""
+    if axis.values is None or list(axis.values) == table.get("values"):
+        return table
+    return {**table, "values": list(axis.values), "labels": list(axis.labels)} if "values" in table else table
+
+
+def _table(table: Mapping[str, Any], key: str) -> Table:
+    value = table.get(key, {})
+    if not isinstance(value, Mapping):
+        raise InputError(f"{key} = {value!r}: give {KEYS[key]}")
+    return dict(value)
+
+
+def _scene(value: Any, folder: Path | None) -> Table:
+    """The table of the base scene, with absolute paths."""
+    if isinstance(value, str):
+        table, path = scene_table(_beside(value, folder))
+        folder = path.parent if path is not None else None
+    elif isinstance(value, Mapping):
+        table = dict(value)
+    else:
+        raise InputError(f"scene = {value!r}: give {KEYS['scene']}")
+    return with_absolute_paths(table, folder)
+
+
+def _beside(source: str, folder: Path | None) -> str:
+    """A path in a study file as seen from here; names of presets as they are."""
+    path = (folder or Path()) / source
+    return str(path) if is_input(path) else source
+
+
+def _sampling(table: Mapping[str, Any], axes: tuple[Axis, ...]) -> Sampling | None:
+    drawn = [axis.name for axis in axes if axis.random]
+    if not drawn and "cells" not in table.get("sampling", {}):
+        if "sampling" in table:
+            raise InputError("sampling: no axis has a distribution; leave it out")
+        return None
+    if "sampling" not in table:
+        raise InputError(
+            f"sampling is missing: axes.{drawn[0]} has a distribution; give [sampling] with samples and seed"
+        )
+    return Sampling(**fields_of(table, "sampling", Sampling))
+
+
+def _texts(table: Mapping[str, Any], key: str, default: tuple[str, ...]) -> tuple[str, ...]:
+    value = table.get(key, list(default))
+    if not isinstance(value, list | tuple) or not all(isinstance(item, str) for item in value):
+        raise InputError(f"{key} = {value!r}: give {KEYS[key]} in quotes")
+    return tuple(value)
+
+
+def _formula(name: str, text: Any) -> str:
+    if not isinstance(text, str):
+        raise InputError(f"quantities.{name} = {text!r}: give a formula in quotes, such as 'peak_sliding_1 / 0.13'")
+    return text
