@@ -21,7 +21,7 @@ from msfp_gen.embedding.library import export_library
 from msfp_gen.embedding.server import Server
 from msfp_gen.embedding.unit import write_fmu
 from msfp_gen.jit.compiler import FLAGS, find_compiler
-from msfp_gen.model.evaluation import bodies_and_surfaces, top_values
+from msfp_gen.model.compiled import bodies_and_surfaces, top_values
 from msfp_gen.specification.layout import ModelSpec
 
 HERE = Path(__file__).parent

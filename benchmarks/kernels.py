@@ -21,7 +21,7 @@ from quick import installed, parser, pick
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Surface, Top, build_model, load_scene, simulate
 from msfp_gen.jit.compiler import FLAGS, find_compiler
-from msfp_gen.model.evaluation import bodies_and_surfaces, top_values
+from msfp_gen.model.compiled import bodies_and_surfaces, top_values
 from msfp_gen.scene.top import load_values
 
 HERE = Path(__file__).parent

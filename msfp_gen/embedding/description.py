@@ -13,7 +13,7 @@ from xml.etree import ElementTree as Xml
 
 from msfp_gen.common.version import __version__
 from msfp_gen.generator.interface import surface_values
-from msfp_gen.model.evaluation import bodies_and_surfaces, top_values
+from msfp_gen.model.compiled import bodies_and_surfaces, top_values
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import RigTop
 from msfp_gen.specification import contract

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.fields import require_type
-from msfp_gen.model.evaluation import bodies_and_surfaces, separations_at_rest, top_values, vector
+from msfp_gen.model.compiled import bodies_and_surfaces, separations_at_rest, top_values, vector
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Rotation

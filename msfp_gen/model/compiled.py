@@ -1,11 +1,26 @@
-"""Types of the classes `Stack`, `Run` and `Port` of a compiled module (`templates/msfp_module.pyx.jinja`)."""
+"""Types of the classes of a compiled module (`templates/msfp_module.pyx.jinja`), and what `Stack` takes and returns."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
+from msfp_gen.scene.friction_parameters import surface_numbers
+from msfp_gen.scene.standing import seat_stiffness
+from msfp_gen.scene.top import MassTop, Top, load_values
+from msfp_gen.specification import contract
+from msfp_gen.specification.contract import STATUSES
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.specification.layout import Effects
+
 
 EventRow = tuple[float, int, int, tuple[float, ...], tuple[float, ...]]
 
@@ -208,3 +223,175 @@ class Port(Protocol):
 
     def step_commit(self, time: float) -> str:
         """Accept the step; status."""
+
+
+Column = tuple[int, int, int]
+
+
+def columns(wrt: str, count: int, planar: bool) -> list[Column]:
+    """The columns of `Model.jacobian` for wrt = "unknowns", "state" or "inputs" of a stack with `count` surfaces.
+
+    Raises InputError for another `wrt`.
+    """
+    makers: dict[str, Callable[[], list[Column]]] = {
+        "unknowns": lambda: unknown_columns(count, planar),
+        "state": lambda: state_columns(count),
+        "inputs": input_columns,
+    }
+    if wrt not in makers:
+        raise InputError(f"wrt = {wrt!r}: give one of {', '.join(makers)}")
+    return makers[wrt]()
+
+
+def unknown_columns(count: int, planar: bool) -> list[Column]:
+    """The unknowns in the order of (2.119): accelerations, contact positions, normal forces."""
+    bodies, angles, contact = range(count), (1,) if planar else (0, 1, 2), (1,) if planar else (0, 1)
+    return [
+        *((0, k + 1, 6 + i) for k in bodies for i in angles),
+        *((1, k, i) for k in bodies for i in contact),
+        *((1, k, 2) for k in bodies),
+    ]
+
+
+def state_columns(count: int) -> list[Column]:
+    """The state q, v and h, each flattened."""
+    bodies = range(count)
+    return [
+        *((0, k + 1, 3 * order + i) for order in (0, 1) for k in bodies for i in range(3)),
+        *((2, k, i) for k in bodies for i in range(2)),
+    ]
+
+
+def input_columns() -> list[Column]:
+    """Base translations and rotations with first and second derivatives, then the load on the top plate."""
+    return [*((3, 0, i) for i in range(9)), *((0, 0, i) for i in range(9)), *((4, 0, i) for i in range(6))]
+
+
+def vector(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Array:
+    """`value` as a finite, contiguous float64 array of the given shape, [its unit], or an InputError that names it."""
+    try:
+        array = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} = {value!r}: give numbers [{unit}], shape {shape}") from error
+    if array.shape != shape:
+        raise InputError(f"{name} has shape {array.shape}: give shape {shape} [{unit}]")
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} has an entry that is not finite: give finite numbers [{unit}]")
+    return array
+
+
+def bodies_and_surfaces(bearing: Bearing, effects: Effects, top: Top | None = None) -> tuple[Array, Array]:
+    """Arrays of bodies, shape (n, values of a body), and surfaces, (n-1, values of a surface) [SI], in contract order.
+
+    top: on which the stiffness of unilateral contacts depends where it is not given. Raises InputError as it does.
+    """
+    arrays = bearing.arrays()
+    if effects.uplift:
+        arrays["seat_stiffness"] = seat_stiffness(bearing, top)
+    rows = [surface_numbers(effects, bearing, index) for index in range(bearing.layout.surfaces)]
+    arrays |= {name: np.array([row[name] for row in rows]) for name in effects.surface_numbers}
+    bodies, surfaces = (
+        np.ascontiguousarray(np.column_stack([arrays[name] for name in columns]))
+        for columns in (contract.names(contract.BODY), contract.surface_values(effects))
+    )
+    return bodies, surfaces
+
+
+def top_values(top: Top | None, anchor: ArrayLike = (0.0, 0.0)) -> Array:
+    """Parameters of the top in contract order, ndarray, shape (values,), SI units.
+
+    anchor: horizontal position of the fixed end of its springs, shape (2,) [m].
+    """
+    values = dict.fromkeys(contract.names(contract.TOP), 0.0)
+    values["anchor_x"], values["anchor_y"] = np.asarray(anchor, dtype=float)
+    numbers = {} if top is None else vars(top)
+    if isinstance(top, MassTop):
+        inertia = top.inertia if isinstance(top.inertia, tuple) else (top.inertia, top.inertia)
+        numbers = {**numbers, "inertia_transverse": inertia[0], "inertia_axial": inertia[1]}
+    values |= {name: value for name, value in numbers.items() if name in values and value is not None}
+    return np.array([float(value) for value in values.values()])
+
+
+def separations_at_rest(bearing: Bearing, top: Top | None, added_load: float = 0.0) -> Array:
+    """Separations at which the unilateral contacts carry all weights and loads, ndarray, shape (n-1, 3) [m].
+
+    added_load: vertical load in addition to that of the top, downward positive [N].
+    """
+    load = added_load + (0.0 if top is None else -float(load_values(top)[2]))
+    mass = top.mass if isinstance(top, MassTop) else 0.0
+    masses = np.array([body.mass for body in bearing.bodies])
+    masses[-1] += mass
+    out = np.zeros((len(masses), 3))
+    out[:, 2] = -settlements(load, bearing.gravity, masses, seat_stiffness(bearing, top))
+    return out
+
+
+def settlements(load: complex, gravity: complex, masses: ArrayLike, stiffness: ArrayLike) -> Any:
+    """Compression of the contacts of all surfaces at rest, ndarray, shape (n-1,) [m].
+
+    load: on the top plate, downward positive [N]. masses: of bodies 2..n with what they carry, shape (n-1,) [kg].
+    stiffness: of the contacts, shape (n-1,) [N/m]. Complex where it is differentiated.
+    """
+    return (load + gravity * np.cumsum(np.asarray(masses)[::-1])[::-1]) / np.asarray(stiffness)
+
+
+FAILURES = {status.name: status.evaluation for status in STATUSES if status.evaluation is not None}
+"""Why there are no accelerations, by status."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """One evaluation of the equations of motion.
+
+    acceleration: ndarray, shape (n-1, 3), second derivatives of psi, theta, phi [rad/s^2]; None in a massless model,
+    which does not determine accelerations. normal_force (n-1,) [N]; contact_angles (n-1, 2) psi~, theta~
+    [rad]; friction_rate (n-1, 2) dY/dt, dZ/dt [1/s]; interface_force (n-1, 3) P on the body above [N]; slip_velocity
+    (n-1, 2) u~, v~ [m/s]; friction_coefficient (n-1,), None where it is constant; sliding, gap (n-1,) [m].
+    residual_norm: largest residual of a balance over its scale [-]; massless: largest moment over the largest normal
+    force, a measure of the distance from equilibrium [m]. determinant: sign of the determinant of the equations.
+    """
+
+    acceleration: Array | None
+    normal_force: Array
+    contact_angles: Array
+    friction_rate: Array
+    interface_force: Array
+    slip_velocity: Array
+    friction_coefficient: Array | None
+    sliding: Array
+    gap: Array
+    residual_norm: float
+    newton_iterations: int
+    determinant: int
+
+    @property
+    def unknowns(self) -> Array:
+        """The unknowns in the order of (2.119): accelerations, contact positions, normal forces; shape (6(n-1),) [SI].
+
+        Raises InputError for a massless model.
+        """
+        if self.acceleration is None:
+            raise InputError("unknowns: a massless model has no accelerations; build it with sliders = 'inertial'")
+        return np.concatenate([self.acceleration.ravel(), self.contact_angles.ravel(), self.normal_force])
+
+
+def named_vectors(n: int, points: Array, rotations: Array, bases: Array) -> dict[str, Array]:
+    """Vectors by their names in `Model.kinematics`, from the arrays of the extension.
+
+    Each is an ndarray, shape (3,) or (3, 3). points: of each body and named point position, velocity and acceleration
+    [m], [m/s], [m/s^2]. rotations: omega, omega', alpha, alpha' of each body [rad/s], [rad/s^2]. bases: rows t_1, t_2,
+    t_3 of each body.
+    """
+    out: dict[str, Array] = {}
+    between = "" if n < 10 else "_"  # "11" would be both a point of body 1 and the centre of body 11
+    for k in range(1, n + 1):
+        bottom = "01" if k == 1 else f"{k - 1}{between}{k}"
+        top = f"{k}{between}{k}"
+        names = (bottom, str(k), top) if k == n else (bottom, str(k), top, f"{k}c")
+        for i, name in enumerate(names):
+            for j, kind in enumerate("rva"):
+                out[f"{kind}_{name}"] = points[k - 1, i, j]
+        for i, kind in enumerate(("omega_{}", "omega'_{}", "alpha_{}", "alpha'_{}")):
+            out[kind.format(k)] = rotations[k - 1, i]
+        out[f"t_{k}"] = bases[k - 1]
+    return out

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.jit.build import BuildInfo, Progress, load
-from msfp_gen.model.compiled import Stack
-from msfp_gen.model.evaluation import (
+from msfp_gen.model.compiled import (
     FAILURES,
     Evaluation,
+    Stack,
     bodies_and_surfaces,
     columns,
     named_vectors,

@@ -14,7 +14,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.elementary import cos, sin
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import require_type
-from msfp_gen.motions import piecewise, samples, waveforms
+from msfp_gen.motions import piecewise, sources
 from msfp_gen.motions.checks import checked_pieces, number, numbers, order, positive, storable
 from msfp_gen.motions.piecewise import Metadata, Pieces
 from msfp_gen.motions.prescribed import Rotation
@@ -266,7 +266,7 @@ class Motion:
             rotation: shape (k, 3), [rad]: psi_1, theta_1, phi_1; None for a base that does not rotate.
             name: a label.
         """
-        return cls._of(samples.from_displacement(time, displacement, rotation), name)
+        return cls._of(sources.from_displacement(time, displacement, rotation), name)
 
     @classmethod
     def from_acceleration(cls, time: ArrayLike, acceleration: ArrayLike, *, name: str = "") -> Motion:
@@ -277,7 +277,7 @@ class Motion:
             acceleration: shape (k, 3), [m/s^2]; a nonzero first value is a jump at the start of the run.
             name: a label.
         """
-        return cls._of(samples.from_acceleration(time, acceleration), name)
+        return cls._of(sources.from_acceleration(time, acceleration), name)
 
     @classmethod
     def from_velocity(cls, time: ArrayLike, velocity: ArrayLike, *, name: str = "") -> Motion:
@@ -288,7 +288,7 @@ class Motion:
             velocity: shape (k, 3), [m/s]; if the first value is not zero, a run starts with base and bearing moving.
             name: a label.
         """
-        return cls._of(samples.from_velocity(time, velocity), name)
+        return cls._of(sources.from_velocity(time, velocity), name)
 
     @classmethod
     def harmonic(
@@ -318,7 +318,7 @@ class Motion:
         rise = period / 4 if lead_in is None else lead_in
         azimuth = number("direction", direction)
         sines = [(float(cos(azimuth)), 1.0, 0.0), (float(sin(azimuth)), 1.0, 0.0)]
-        return cls._of(waveforms.enveloped_sines(amplitude, sines, period, cycles, rise), name)
+        return cls._of(sources.enveloped_sines(amplitude, sines, period, cycles, rise), name)
 
     @classmethod
     def circle(
@@ -335,7 +335,7 @@ class Motion:
         """
         period = 2 * np.pi / positive("angular_frequency", angular_frequency)
         sines = [(1.0, 1.0, np.pi / 2), (1.0, 1.0, 0.0)]
-        return cls._of(waveforms.enveloped_sines(amplitude, sines, period, cycles, lead_in), name)
+        return cls._of(sources.enveloped_sines(amplitude, sines, period, cycles, lead_in), name)
 
     @classmethod
     def figure_eight(
@@ -352,7 +352,7 @@ class Motion:
         """
         period = 2 * np.pi / positive("angular_frequency", angular_frequency)
         sines = [(1.0, 1.0, np.pi / 2), (1.0, 2.0, 0.0)]
-        return cls._of(waveforms.enveloped_sines(amplitude, sines, period, cycles, lead_in), name)
+        return cls._of(sources.enveloped_sines(amplitude, sines, period, cycles, lead_in), name)
 
     @classmethod
     def ramp(cls, acceleration: float, duration: float, *, direction: float = 0.0, name: str = "") -> Motion:
@@ -402,7 +402,7 @@ class Motion:
         from msfp_gen.motions.records import prepared
 
         corrected, factor = prepared(record, scale, scale_to, start, duration, correct, corner, taper)
-        return cls._of(samples.from_corrected(corrected, factor), record.name if name is None else name)
+        return cls._of(corrected.pieces(factor), record.name if name is None else name)
 
     @classmethod
     def from_csv(cls, path: str | PathLike[str], *, name: str = "") -> Motion:

@@ -14,9 +14,8 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.motions import piecewise
 from msfp_gen.motions.checks import finite, increasing, number, numbers, order, positive, storable, vector
 from msfp_gen.motions.piecewise import ORDER, powers
-from msfp_gen.motions.samples import sampled_linear
+from msfp_gen.motions.sources import product, sampled_linear, sine, smoothstep, wave_knots
 from msfp_gen.motions.time_grid import Resolution
-from msfp_gen.motions.waveforms import product, sine, smoothstep, wave_knots
 
 
 @dataclass(frozen=True, eq=False, repr=False)

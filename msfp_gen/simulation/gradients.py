@@ -14,7 +14,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
-from msfp_gen.model.evaluation import bodies_and_surfaces, settlements, top_values
+from msfp_gen.model.compiled import bodies_and_surfaces, settlements, top_values
 from msfp_gen.model.plane import motion_in_plane, out_of_plane, wrench_in_plane
 from msfp_gen.motions.time_grid import snapped
 from msfp_gen.results.extremes import Extremes

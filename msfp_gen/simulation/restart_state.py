@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.model.evaluation import separations_at_rest
+from msfp_gen.model.compiled import separations_at_rest
 from msfp_gen.model.plane import out_of_plane, rotated_pairs, tilts_out_of_plane
 from msfp_gen.results.geometry import rim_forces
 from msfp_gen.scene.standing import seat_stiffness

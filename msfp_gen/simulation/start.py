@@ -13,7 +13,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
-from msfp_gen.model.evaluation import separations_at_rest
+from msfp_gen.model.compiled import separations_at_rest
 from msfp_gen.model.plane import (
     motion_in_plane,
     out_of_plane,

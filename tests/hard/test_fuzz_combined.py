@@ -14,7 +14,7 @@ import pytest
 from support import preset_run, scene_of
 
 from msfp_gen import Auto, Load, Motion, simulate
-from msfp_gen.model.evaluation import named_vectors
+from msfp_gen.model.compiled import named_vectors
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ from msfp_gen import (
     presets,
     simulate,
 )
-from msfp_gen.model.evaluation import bodies_and_surfaces, top_values
+from msfp_gen.model.compiled import bodies_and_surfaces, top_values
 from msfp_gen.results.geometry import contact_offsets
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite, positive
-from msfp_gen.motions.piecewise import evaluate, from_rates
+from msfp_gen.motions.piecewise import Pieces, evaluate, from_rates
 from msfp_gen.motions.records.record import Record, sample_times
-from msfp_gen.motions.waveforms import product, smoothstep
+from msfp_gen.motions.sources import product, resolving_step, smoothstep
 
 _ORDER = 4  # of the Butterworth filter
 _MAX_PAD = 1e7  # samples of rest before and after a record, in which the filter settles
@@ -47,6 +47,14 @@ class Corrected:
         return Corrected(
             self.time, factor * self.acceleration, factor * self.velocity, factor * self.displacement, metadata
         )
+
+    def pieces(self, scale: float) -> Pieces:
+        """The piecewise polynomials of a `Motion`, times `scale`. Raises InputError unless it is positive."""
+        rates = np.zeros((2, len(self.time), 6))
+        factor = positive("scale", scale)
+        rates[:, :, :3] = factor * np.array([self.velocity, self.acceleration])
+        coefficients = from_rates(self.time, rates[0], rates[1])
+        return Pieces(self.time, coefficients, resolving_step(self.time), {**self.metadata, "scale": factor})
 
     def as_record(self, source: Record) -> Record:
         """The processed motion as a record, with names and notes of `source`, for `write_csv`."""

@@ -16,7 +16,7 @@ from support.example import example_bearing
 from msfp_gen import Solver, Top, TwoPort, cli
 from msfp_gen.embedding import values
 from msfp_gen.jit.compiler import find_compiler
-from msfp_gen.model.evaluation import bodies_and_surfaces, top_values
+from msfp_gen.model.compiled import bodies_and_surfaces, top_values
 
 PROGRAM = ROOT / "tests" / "support" / "c" / "two_port.c"
 STRICT = ("-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic")

@@ -12,7 +12,7 @@ from support import ROOT, model_of
 from support.emitted_c import text
 
 from msfp_gen import Effects, Solver, Surface
-from msfp_gen.model.evaluation import FAILURES
+from msfp_gen.model.compiled import FAILURES
 from msfp_gen.results.history import ENERGY, Counters, Event
 from msfp_gen.specification import contract
 from msfp_gen.specification.contract import names
