@@ -23,11 +23,10 @@ from msfp_gen.buildings.file import reduced
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.scene import Scene
 from msfp_gen.studies import estimate
-from msfp_gen.studies.batch import run_to_end
+from msfp_gen.studies.batch import pool_from, run_to_end
 from msfp_gen.studies.definition import example_text, load_study
 from msfp_gen.studies.estimation.estimate import Estimate, Question, estimate_table, estimated, fragility_of
 from msfp_gen.studies.estimation.source import StudySource, crossings
-from msfp_gen.studies.pool import pool_from
 
 sys.path.append(str(Path(__file__).parent))
 from quick import parser, pick

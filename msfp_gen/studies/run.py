@@ -30,10 +30,18 @@ from msfp_gen.common.version import __version__
 from msfp_gen.jit.cache import digest_sources
 from msfp_gen.scene.file.loader import dumps, toml_file
 from msfp_gen.studies.axes import INTENSITY, Recipe, SceneFactory
-from msfp_gen.studies.batch import BAD_INPUT, ENDED, OUT_OF_TIME, build_models, check_method, run_to_end
+from msfp_gen.studies.batch import (
+    BAD_INPUT,
+    ENDED,
+    OUT_OF_TIME,
+    Pool,
+    build_models,
+    check_method,
+    pool_from,
+    run_to_end,
+)
 from msfp_gen.studies.columns import Column, Keep
 from msfp_gen.studies.definition import Study, Task, load_study
-from msfp_gen.studies.pool import Pool, pool_from
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.file import AnyScene

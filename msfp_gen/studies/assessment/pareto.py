@@ -25,8 +25,8 @@ from msfp_gen.studies.assessment.rows import (
     write_frame,
 )
 from msfp_gen.studies.axes import Sampling, values_at
+from msfp_gen.studies.batch import Pool, pool_from, require
 from msfp_gen.studies.definition import Study, load_study
-from msfp_gen.studies.pool import Pool, pool_from, require
 from msfp_gen.studies.run import run_on
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from msfp_gen.studies.assessment.rows import (
     unit_of,
 )
 from msfp_gen.studies.axes import Sampling
-from msfp_gen.studies.pool import require
+from msfp_gen.studies.batch import require
 from msfp_gen.studies.run import study_table
 
 if TYPE_CHECKING:

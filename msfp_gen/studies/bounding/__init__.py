@@ -5,17 +5,6 @@ from msfp_gen.studies.bounding.runs import CASES, Bounds, Case, bound, bounded_s
 from msfp_gen.studies.bounding.suite import SuiteBounds, bound_suite
 
 __all__ = [
-    "CASES",
-    "Bounds",
-    "Case",
-    "Factor",
-    "FactorTable",
-    "SuiteBounds",
-    "bound",
-    "bound_suite",
-    "bounded_scene",
-    "bounded_scenes",
-    "factor_tables",
-    "factor_text",
-    "load_factors",
-]
+    "CASES", "Bounds", "Case", "Factor", "FactorTable", "SuiteBounds", "bound", "bound_suite", "bounded_scene",
+    "bounded_scenes", "factor_tables", "factor_text", "load_factors",
+]  # fmt: skip

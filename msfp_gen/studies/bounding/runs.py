@@ -49,11 +49,6 @@ WIDER: dict[str, tuple[str, Any]] = {
 Progress = Callable[[float, float], None]
 
 
-def compared_quantities(scene: AnyScene) -> dict[str, Source]:
-    """The quantities that are compared for a scene; loop properties are cycle means."""
-    return {name: source for name, source in catalogue(Counts.of(scene)).items() if source.compared}
-
-
 @dataclass(frozen=True)
 class Case:
     """One run of a bounding analysis.
@@ -71,6 +66,12 @@ class Case:
     result: Result | BuildingResult | None
     characterisation: Characterisation | None
     failure: str = ""
+
+    def value(self, source: Source) -> float | None:
+        """A quantity in SI; None where the run failed or it is not defined."""
+        if self.result is None or self.characterisation is None:
+            return None
+        return source.value(self.result.summary, self.characterisation)  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)
@@ -98,26 +99,14 @@ class Bounds:
         return _typical(next(case for case in self.cases if case.name == "nominal").scene)
 
     @property
-    def surfaces(self) -> int:
-        """Number of its surfaces."""
-        return len(self.bearing.surfaces)
-
-    @property
     def compared(self) -> dict[str, Source]:
-        """Name -> quantity that is compared."""
-        return compared_quantities(self.cases[0].scene)
+        """Name -> quantity that is compared; loop properties are cycle means."""
+        counts = Counts.of(self.cases[0].scene)
+        return {name: source for name, source in catalogue(counts).items() if source.compared}
 
     def quantities(self) -> dict[str, dict[str, float | None]]:
         """Quantity -> case -> value in SI; None where a run failed or the quantity is not defined in it."""
-        return {
-            name: {
-                case.name: None
-                if case.result is None or case.characterisation is None
-                else source.value(case.result.summary, case.characterisation)
-                for case in self.cases
-            }
-            for name, source in self.compared.items()
-        }
+        return {name: {case.name: case.value(source) for case in self.cases} for name, source in self.compared.items()}
 
     def undefined(self) -> dict[str, str]:
         """Quantity -> the cases without a value, and why; only where the reason is known."""
@@ -144,16 +133,9 @@ class Bounds:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON: factors, quantities by case, governing cases, and each characterisation."""
-        table = self.table
+        of_table = ("name", "description", "source", "rule", "adjustment")
         return {
-            "factors": {
-                "name": table.name,
-                "description": table.description,
-                "source": table.source,
-                "rule": table.rule,
-                "adjustment": table.adjustment,
-                "lambdas": self.lambdas,
-            },
+            "factors": {**{name: getattr(self.table, name) for name in of_table}, "lambdas": self.lambdas},
             "quantities": self.quantities(),
             "governing": self.governing(),
             "undefined": self.undefined(),
@@ -175,14 +157,8 @@ def bound(scene: AnyScene, table: FactorTable, *, progress: Progress | None = No
     A case that fails is part of the result, and the other cases are run. All cases have the same effects: where `Auto`
     ends with different ones, they are run again with what any of them needs.
 
-    Args:
-        scene: the nominal case.
-        table: factors of the properties.
-        progress: called with the share of the runs that is done, and 1.
-
-    Raises:
-        InputError: a factor of a surface that the bearing does not have, or a bearing that does not move.
-        RunError: no case has rows.
+    progress: called with the share of the runs that is done, and 1. Raises InputError: a factor of a surface that the
+    bearing does not have, or a bearing that does not move; RunError: no case has rows.
     """
     cases = _cases(scene, table, progress)
     if isinstance(scene, Scene) and (common := _common_effects(scene, cases)) is not None:
@@ -300,17 +276,11 @@ def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[
                     "give one factor for each property of a surface"
                 )
             of_surfaces[surface] = table.combined(factor)
-    ends = {"lower": 0, "upper": 1}
-    return {
-        named: {
-            case: tuple(
-                of_surfaces.get(surface, (1.0, 1.0))[ends[case]] if case in ends else 1.0
-                for surface in range(1, count + 1)
-            )
-            for case in CASES
-        }
-        for named, of_surfaces in pairs.items()
-    }
+    lambdas = {}
+    for named, of_surfaces in pairs.items():
+        lower, upper = zip(*(of_surfaces.get(surface, (1.0, 1.0)) for surface in range(1, count + 1)), strict=True)
+        lambdas[named] = {"lower": lower, "nominal": (1.0,) * count, "upper": upper}
+    return lambdas
 
 
 # SI unit -> (unit shown, scale).
@@ -393,7 +363,7 @@ def _lambda_table(bounds: Bounds) -> Table:
             *(f"{factors[case][surface] * getattr(nominal[surface], named):.4g}" for case in CASES),
         )
         for named, factors in bounds.lambdas.items()
-        for surface in range(bounds.surfaces)
+        for surface in range(len(nominal))
     ]
     return Table("lambda of every surface, and property times lambda [SI]", ("", *CASES, *CASES), rows)
 
@@ -430,13 +400,8 @@ def _draw(axes: Axes, bounds: Bounds, cases: list[Case], axis: int) -> None:
     forces = [force[:, axis] for _, force in loops]
     scale = engineering(np.concatenate(forces), "N") if forces else engineering(0.0, "N")
     for case, (u, _), values in zip(cases, loops, forces, strict=True):
-        axes.plot(
-            displacement(u[:, axis]),
-            force(values, scale),
-            label=_label(bounds, case),
-            linewidth=THIN,
-            **LINE_STYLES[case.name],
-        )
+        style = {"label": _label(bounds, case), "linewidth": THIN, **LINE_STYLES[case.name]}
+        axes.plot(displacement(u[:, axis]), force(values, scale), **style)
     sign = subscript(axis + 1)
     axes.set(
         title=f"Force and displacement along E{sign}",

@@ -90,21 +90,13 @@ class SuiteBounds:
         )
 
     def _statistic(self, name: str, values: Array) -> Statistic:
-        quantity = self.sources[name].quantity
-        pick = WORST[quantity.governs]
+        unit, governs = self.sources[name].quantity.unit, self.sources[name].quantity.governs
+        pick = WORST[governs]
         means, worst = values.mean(axis=0), pick(values, axis=0)
-        case = int(np.flatnonzero(means == pick(means))[0])
-        record = int(np.argwhere(values == pick(values))[0][0])
-        return Statistic(
-            name,
-            self.parts[name],
-            quantity.unit,
-            quantity.governs,
-            tuple(means.tolist()),
-            tuple(worst.tolist()),
-            CASES[case],
-            self.records[record],
-        )
+        case = CASES[int(np.flatnonzero(means == pick(means))[0])]
+        record = self.records[int(np.argwhere(values == pick(values))[0][0])]
+        numbers = tuple(means.tolist()), tuple(worst.tolist())
+        return Statistic(name, self.parts[name], unit, governs, *numbers, case, record)
 
     @property
     def left_out(self) -> dict[str, str]:
@@ -156,8 +148,7 @@ def bound_suite(
                 failures[record, case.name] = case.failure
                 continue
             for key, source in sources.items():
-                value = source.value(case.result.summary, case.characterisation)
-                if value is not None:
+                if (value := case.value(source)) is not None:
                     values[key][row, column] = value
                 elif why := source.reason(case.characterisation):
                     undefined[key] = why
@@ -193,7 +184,13 @@ def _quantities(scene: AnyScene) -> tuple[dict[str, Source], dict[str, str]]:
 
 def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
     """Tables of the statistics of the whole, of what has none, and of runs that failed; parts: `write_statistics`."""
-    rows = [_cells(statistic) for statistic in bounds.statistics if not statistic.part]
+    rows = []
+    for statistic in bounds.statistics:
+        if not statistic.part:
+            unit, scale = shown_as(statistic.unit)
+            numbers = [f"{value * scale:.4g}" for value in (*statistic.means, *statistic.worst)]
+            name = f"{_label(statistic.name, '')} [{unit}]"
+            rows.append((name, *numbers, statistic.governs, statistic.record))
     columns = ("", *(f"mean {case}" for case in CASES), *(f"worst {case}" for case in CASES), "governs", "worst record")
     reasons = [(_label(name, bounds.parts[name]), why) for name, why in bounds.left_out.items()]
     exceeded = [(f"{record}, {case}", verdict) for (record, case), verdict in bounds.exceeded.items()]
@@ -210,12 +207,6 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
 def _label(name: str, part: str) -> str:
     stem = name.rpartition("_")[0] if part else name
     return stem.replace("_", " ") + (f" of {part}" if part else "")
-
-
-def _cells(statistic: Statistic) -> tuple[str, ...]:
-    unit, scale = shown_as(statistic.unit)
-    numbers = (f"{value * scale:.4g}" for value in (*statistic.means, *statistic.worst))
-    return (f"{_label(statistic.name, statistic.part)} [{unit}]", *numbers, statistic.governs, statistic.record)
 
 
 def write_statistics(bounds: SuiteBounds, path: str | Path) -> Path:

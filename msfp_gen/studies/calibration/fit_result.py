@@ -175,9 +175,13 @@ def fit_tables(fit: Fit) -> list[Table]:
 
 def estimate_table(fit: Fit) -> Table:
     """Values, intervals and starts."""
-    columns = ("parameter", "value", "95 % interval", "start", "unit")
+    rows = []
+    for e in fit.estimates:
+        spread = f"{e.low:.4g} to {e.high:.4g}" if np.isfinite(e.high) else "not determined"
+        value = f"{e.value:.5g}" + (" (bound)" if e.at_bound else "")
+        rows.append((e.name, value, spread, f"{e.start:.4g}", e.unit or "-"))
     title = f"fitted in {fit.evaluations} evaluations, the last with rtol {fit.rtol:g}"
-    return Table(title, columns, [_row(e) for e in fit.estimates])
+    return Table(title, ("parameter", "value", "95 % interval", "start", "unit"), rows)
 
 
 def correlation_table(fit: Fit) -> Table:
@@ -187,11 +191,7 @@ def correlation_table(fit: Fit) -> Table:
         (estimate.name, *(f"{value:+.3f}" if np.isfinite(value) else "-" for value in line))
         for estimate, line in zip(fit.estimates, fit.correlation, strict=True)
     ]
-    return Table(
-        f"correlation, in the same order; condition {fit.condition:.3g}",
-        ("parameter", *numbers),
-        rows,
-    )
+    return Table(f"correlation, in the same order; condition {fit.condition:.3g}", ("parameter", *numbers), rows)
 
 
 def residual_table(fit: Fit) -> Table:
@@ -201,12 +201,6 @@ def residual_table(fit: Fit) -> Table:
         for test in fit.tests
     ]
     return Table("residuals", ("test", "deviation [N]", "over the peak [%]", "rows"), shares)
-
-
-def _row(estimate: Estimate) -> tuple[str, ...]:
-    spread = f"{estimate.low:.4g} to {estimate.high:.4g}" if np.isfinite(estimate.high) else "not determined"
-    value = f"{estimate.value:.5g}" + (" (bound)" if estimate.at_bound else "")
-    return estimate.name, value, spread, f"{estimate.start:.4g}", estimate.unit or "-"
 
 
 ACROSS = 4  # tests beside each other

@@ -52,38 +52,16 @@ def fit(
     cores. `scipy.optimize.least_squares` makes the next step within the bounds (method "trf"). Runs begin with the
     tolerance of the scene, and go on with smaller ones until their error is small against the intervals.
 
-    Parameters
-    ----------
-    scene
-        The bearing on its test rig, with the values at the start. The displacement of each test replaces its motion.
-    tests
-        Files with the columns time, displacement and force, or measurements.
-    parameters
-        Paths, such as `bearing.surfaces[*].friction`; `A=B` gives the same value to both.
-    bounds
-        Path -> least and largest value [SI]; by default a tenth and ten times the value in the scene.
-    offset
-        Fit an offset of the force of each test too.
-    columns
-        Names of the columns: see `read_measurement`.
-    progress
-        Called during the runs, in their threads, with the number of the evaluation, its share that is done and the
-        last deviation [N]. An exception in it ends the fit.
-    max_evaluations
-        At most so many evaluations in the search; tighter runs at its end are not counted.
+    scene: the bearing on its test rig, with the values at the start; the displacement of each test replaces its motion.
+    tests: files with the columns time, displacement and force, or measurements. parameters: paths, such as
+    `bearing.surfaces[*].friction`; `A=B` gives the same value to both. bounds: path -> least and largest value [SI]; by
+    default a tenth and ten times the value in the scene. offset: fit an offset of the force of each test too. columns:
+    names of the columns: see `read_measurement`. progress: called during the runs, in their threads, with the number of
+    the evaluation, its share that is done and the last deviation [N]; an exception in it ends the fit.
+    max_evaluations: at most so many evaluations in the search; tighter runs at its end are not counted.
 
-    Returns
-    -------
-    Fit
-        Estimates with 95 % intervals, correlations, what the tests cannot identify, and the fitted scene.
-
-    Raises
-    ------
-    InputError
-        A file, a parameter or a bound is wrong, or runs of the scene have no gradients: one line.
-    RunError
-        A run of the scene as it was given fails, or the fit has not converged after `max_evaluations`.
-
+    Raises InputError: a file, a parameter or a bound is wrong, or runs of the scene have no gradients: one line.
+    RunError: a run of the scene as it was given fails, or the fit has not converged after `max_evaluations`.
     """
     return end_fit(scene, start_fit(scene, tests, parameters, bounds, offset, columns, progress), max_evaluations)
 
@@ -91,8 +69,7 @@ def fit(
 def end_fit(scene: Scene, residuals: Residuals, max_evaluations: int = 100) -> Fit:
     """The fit of the residuals of `start_fit`; arguments and RunError as of `fit`."""
     start, low, high = search_range(residuals)
-    solution = solve(residuals, start, low, high, max_evaluations)
-    return _outcome(scene, residuals, solution, (low, high))
+    return _outcome(scene, residuals, solve(residuals, start, low, high, max_evaluations), (low, high))
 
 
 def search_range(residuals: Residuals) -> tuple[Array, Array, Array]:
@@ -143,22 +120,12 @@ def _outcome(scene: Scene, residuals: Residuals, solution: Solution, limits: tup
     starts = [u.start for u in residuals.unknowns] + [0.0] * residuals.offsets
     values, half = solution.x * scale, solution.half * scale
     bounds = list(zip(*((limit * scale).tolist() for limit in limits), strict=True))
-    estimates = tuple(
-        Estimate(*row)
-        for row in zip(
-            residuals.names,
-            units,
-            values.tolist(),
-            starts,
-            (solution.spread.deviation * scale).tolist(),
-            (values - half).tolist(),
-            (values + half).tolist(),
-            (solution.run_error * scale).tolist(),
-            bounds,
-            solution.at_bound.tolist(),
-            strict=True,
-        )
+    deviation, run_error = solution.spread.deviation * scale, solution.run_error * scale
+    columns = [column.tolist() for column in (deviation, values - half, values + half, run_error)]
+    rows = zip(
+        residuals.names, units, values.tolist(), starts, *columns, bounds, solution.at_bound.tolist(), strict=True
     )
+    estimates = tuple(Estimate(*row) for row in rows)
     tests = tuple(FittedTest(test, force) for test, force in zip(residuals.tests, solution.end.forces, strict=True))
     lines = weak(residuals.names[:size], values[:size], half[:size], solution.spread.correlation[:size, :size])
     return Fit(
@@ -200,11 +167,8 @@ def _error_notes(residuals: Residuals, solution: Solution) -> list[str]:
         some = np.isfinite(spread.half) & ~solution.at_bound
         wider = solution.run_error[some] / np.maximum(spread.half[some], np.finfo(float).tiny)
         if (wider > SMALL).any():
-            remedy = (
-                f"runs with a smaller one fail ({solution.failure})"
-                if solution.failure
-                else "give a smaller solver.rtol"
-            )
+            failure = solution.failure
+            remedy = f"runs with a smaller one fail ({failure})" if failure else "give a smaller solver.rtol"
             lines.append(
                 f"the errors of the runs limit this fit: intervals are wider by up to {100 * wider.max():.2g} % for "
                 f"them, with rtol = {solution.rtol:g}; {remedy}"
@@ -301,16 +265,10 @@ def _solution(residuals: Residuals, x: Array, end: Evaluation, low: Array, high:
     """What an evaluation tells of the errors of x, where that of its runs is not measured."""
     known = identified(end.jacobian, residuals.names)
     noises = noise_of(residuals.split(end.residuals), residuals.split(known.basis))
-    at_bound, unmeasured = _at_bound(x, end, low, high), np.full(len(x), np.inf)
-    return Solution(x, end, known, spread_of(known, noises), at_bound, residuals.rtol, unmeasured)
-
-
-def _at_bound(x: Array, end: Evaluation, low: Array, high: Array) -> NDArray[np.bool_]:
-    """Which unknowns are at a bound, or have their minimum beyond it."""
     near = np.isfinite(low) & (np.minimum(x - low, high - x) < AT_BOUND * (high - low))
-    beyond = x + end.step(~near)
-    at_bound: NDArray[np.bool_] = near | (beyond < low) | (beyond > high)
-    return at_bound
+    beyond = x + end.step(~near)  # where the minimum is
+    at_bound, unmeasured = near | (beyond < low) | (beyond > high), np.full(len(x), np.inf)
+    return Solution(x, end, known, spread_of(known, noises), at_bound, residuals.rtol, unmeasured)
 
 
 class _WithinError(Exception):

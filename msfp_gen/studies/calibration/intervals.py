@@ -119,8 +119,7 @@ def _lag_sums(first: Array, second: Array) -> Array:
     """Sums over i and columns of first[i] second[i + lag] for every lag from 0, shape (T,)."""
     rows = len(first)
     product = np.conj(np.fft.rfft(first, 2 * rows, axis=0)) * np.fft.rfft(second, 2 * rows, axis=0)
-    sums: Array = np.fft.irfft(product.sum(axis=1), 2 * rows)[:rows]
-    return sums
+    return np.fft.irfft(product.sum(axis=1), 2 * rows)[:rows]
 
 
 class Identified(NamedTuple):
@@ -183,7 +182,7 @@ def spread_of(known: Identified, noises: Sequence[Noise]) -> Spread:
     """
     from scipy.stats import t
 
-    bases = _split(known.basis, noises)
+    bases = np.split(known.basis, np.cumsum([len(noise.correlation) for noise in noises])[:-1])
     inner = [basis.T @ noise.covariance_times(basis) for basis, noise in zip(bases, noises, strict=True)]
     parts = np.array([known.factors @ matrix @ known.factors.T for matrix in inner])
     covariance, variances = parts.sum(axis=0), np.einsum("tkk->tk", parts)
@@ -193,20 +192,10 @@ def spread_of(known: Identified, noises: Sequence[Noise]) -> Spread:
     some = np.isfinite(deviation) & (deviation > 0)
     squares = variances[:, some] ** 2 / np.array([[noise.freedom] for noise in noises])
     freedom[some] = np.maximum(deviation[some] ** 4 / squares.sum(axis=0), 1.0)
-    return Spread(deviation, t.ppf(0.5 + CONFIDENCE / 2, freedom) * deviation, _correlation(covariance))
-
-
-def _split(rows: Array, noises: Sequence[Noise]) -> list[Array]:
-    """Rows of all tests as those of each."""
-    return np.split(rows, np.cumsum([len(noise.correlation) for noise in noises])[:-1])
-
-
-def _correlation(covariance: Array) -> Array:
-    deviation = np.sqrt(np.diag(covariance))
-    deviation = np.where(np.isfinite(deviation) & (deviation > 0), deviation, np.nan)
+    known_ones = np.where(some, deviation, np.nan)
     with np.errstate(invalid="ignore"):
-        correlation: Array = covariance / np.outer(deviation, deviation)
-    return correlation
+        correlation = covariance / np.outer(known_ones, known_ones)
+    return Spread(deviation, t.ppf(0.5 + CONFIDENCE / 2, freedom) * deviation, correlation)
 
 
 def weak(names: Sequence[str], values: Array, half: Array, correlation: Array) -> list[str]:

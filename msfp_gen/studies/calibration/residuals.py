@@ -17,9 +17,9 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.parameters import Parameter, changed_parameters, parameters_of
 from msfp_gen.simulation.gradients import UNDAMPED, undamped_surfaces
 from msfp_gen.simulation.simulate import simulate
+from msfp_gen.studies.batch import SharedProgress, local_pool
 from msfp_gen.studies.calibration.intervals import SINGULAR
 from msfp_gen.studies.calibration.measurement import Measurement
-from msfp_gen.studies.pool import SharedProgress, local_pool
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
@@ -82,7 +82,13 @@ def unknowns_of(
             unknowns.append(_unknown(name, group, rest.pop(name, limits)))
     if rest:
         raise InputError(f"bounds: {next(iter(rest))!r} is no parameter of this fit; give one of its paths")
-    _check_members([member for unknown in unknowns for member in unknown.members])
+    fitted = [member for unknown in unknowns for member in unknown.members]
+    names = [member.path for member in fitted]
+    for member in fitted:
+        if names.count(member.path) > 1:
+            raise InputError(f"parameters = {member.path!r}: given twice; give each parameter once")
+        if member.part in _OF_THE_TEST:
+            raise InputError(f"parameters = {member.path!r}: {_OF_THE_TEST[member.part]}; leave it out")
     return tuple(unknowns)
 
 
@@ -105,8 +111,9 @@ def _unknown(name: str, members: tuple[Parameter, ...], limits: tuple[float, flo
     if limits is None:
         if first.value == 0:
             raise InputError(f"parameters = {name!r}: it is 0 in the scene, which gives no range; give bounds for it")
-        limits = (min(first.value / RANGE, first.value * RANGE), max(first.value / RANGE, first.value * RANGE))
-    low, high = (float(limit) for limit in limits)
+        ends = first.value / RANGE, first.value * RANGE
+        limits = min(ends), max(ends)
+    low, high = map(float, limits)
     if not low < high or not np.isfinite([low, high]).all():
         raise InputError(f"bounds of {name} = {low:g}, {high:g}: give a lower bound below an upper one")
     if (first.least is not None and low < first.least) or (first.above is not None and low <= first.above):
@@ -115,15 +122,6 @@ def _unknown(name: str, members: tuple[Parameter, ...], limits: tuple[float, flo
     if not low < first.value < high:
         raise InputError(f"bounds of {name} = {low:g}, {high:g}: the scene has {first.value:g}; start between them")
     return Unknown(name, members, low, high)
-
-
-def _check_members(members: Sequence[Parameter]) -> None:
-    paths = [member.path for member in members]
-    for member in members:
-        if paths.count(member.path) > 1:
-            raise InputError(f"parameters = {member.path!r}: given twice; give each parameter once")
-        if member.part in _OF_THE_TEST:
-            raise InputError(f"parameters = {member.path!r}: {_OF_THE_TEST[member.part]}; leave it out")
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from msfp_gen.common.fields import Choice, Quantity, check_fields, to_si
 from msfp_gen.common.tables import Table
 from msfp_gen.figures.style import COLOURS, FAINT, INK, headline, page
 from msfp_gen.studies.assessment.rows import labelled
+from msfp_gen.studies.batch import pool_from
 from msfp_gen.studies.definition import Study, load_study
 from msfp_gen.studies.estimation.estimators import (
     EXACT,
@@ -42,7 +43,6 @@ from msfp_gen.studies.estimation.estimators import (
     variance_of,
 )
 from msfp_gen.studies.estimation.source import Searches, Source, StudySource
-from msfp_gen.studies.pool import pool_from
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

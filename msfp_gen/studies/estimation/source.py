@@ -22,11 +22,11 @@ from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.specification import formula
 from msfp_gen.studies.assessment.rows import numbers, read_study
 from msfp_gen.studies.axes import Sampling, SceneFactory, values_at
+from msfp_gen.studies.batch import Pool
 from msfp_gen.studies.columns import Keep
 from msfp_gen.studies.definition import Study
 from msfp_gen.studies.estimation.backbone_run import OF_SURFACES, QUANTITIES, check_backbone
 from msfp_gen.studies.estimation.estimators import EXACT, Flags, Indices
-from msfp_gen.studies.pool import Pool
 from msfp_gen.studies.run import STUDY_FILE, parts_in, readable_parts, run_on, study_table
 
 BLOCK = 1024  # draws that are made together

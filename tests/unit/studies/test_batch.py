@@ -45,7 +45,7 @@ from msfp_gen.motions.prescribed import Rotation
 from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import EffectSelection
 from msfp_gen.scene.scene import InitialState
-from msfp_gen.studies import batch, pool
+from msfp_gen.studies import batch
 from msfp_gen.studies.sweep import variations, varied_field
 
 STILL = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, ORDER)))
@@ -298,10 +298,10 @@ def test_a_run_that_fails_at_its_start_has_the_state_there(monkeypatch: pytest.M
 
 def test_the_number_of_workers_is_that_of_the_cores_or_as_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 3, 5}, raising=False)
-    assert usable_cores() == pool.worker_count(None) == 3 and pool.worker_count(2) == 2
+    assert usable_cores() == batch.worker_count(None) == 3 and batch.worker_count(2) == 2
     monkeypatch.delattr(os, "sched_getaffinity")
     monkeypatch.setattr(os, "cpu_count", lambda: 7)
-    assert pool.worker_count(None) == 7
+    assert batch.worker_count(None) == 7
 
 
 def test_fields_take_several_values() -> None:

@@ -310,7 +310,7 @@ def test_an_interruption_stops_all_runs(monkeypatch: Any) -> None:
     def interrupted(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("msfp_gen.studies.pool.wait", interrupted)
+    monkeypatch.setattr("msfp_gen.studies.batch.wait", interrupted)
     with pytest.raises(KeyboardInterrupt):
         bound(load_scene("fenz-test2"), load_factors("asce7"))
 

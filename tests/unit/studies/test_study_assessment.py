@@ -327,6 +327,6 @@ def test_sobol_needs_its_library_or_runs(tmp_path: Path, capsys: pytest.CaptureF
 
 
 def test_a_missing_library_is_named(one_at_a_time: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("msfp_gen.studies.pool.find_spec", lambda _: None)
+    monkeypatch.setattr("msfp_gen.studies.batch.find_spec", lambda _: None)
     with pytest.raises(InputError, match=r"Sobol' indices needs SALib; pip install 'msfp-gen\[salib\]'"):
         sobol(one_at_a_time, "found")

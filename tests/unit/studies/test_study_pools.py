@@ -159,7 +159,7 @@ def test_a_killed_worker_costs_nothing_but_time(cluster: Any, whole: pd.DataFram
 
 def test_no_scheduler_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("msfp_gen.studies.pool.CONNECT", "1s")
+    monkeypatch.setattr("msfp_gen.studies.batch.CONNECT", "1s")
     with pytest.raises(InputError, match=r"--dask = 'tcp://127.0.0.1:9': no scheduler answers there") as caught:
         msfp_gen.study(many(), tmp_path / "out", dask="tcp://127.0.0.1:9")
     assert "\n" not in str(caught.value) and not (tmp_path / "out").exists()
