@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -156,7 +156,31 @@ class Sampling:
         """Shares of the distributions, ndarray, shape (samples, axes), [-], in (0, 1); equal for equal seeds."""
         if not axes:
             return np.zeros((1, 0))
-        return np.clip(_DRAWS[self.method](self, axes), *WITHIN)
+        from scipy.stats import qmc
+
+        rng, count = np.random.default_rng(self.seed), self.samples or 0
+        if self.method == "latin-hypercube":
+            rows = qmc.LatinHypercube(axes, rng=rng).random(count)
+        elif self.method == "random":
+            rows = rng.random((count, axes))
+        elif self.method == "one-at-a-time":  # medians, then two rows for each axis: its lower and its upper quantile
+            rows = np.full((1 + 2 * axes, axes), 0.5)
+            for axis in range(axes):
+                rows[1 + 2 * axis : 3 + 2 * axis, axis] = self.quantiles
+        elif count & (count - 1):
+            near = 2 ** max(count.bit_length() - 1, 0), 2 ** count.bit_length()
+            raise InputError(
+                f"sampling.samples = {count}: a Sobol' sequence needs a power of two; give {near[0]} or {near[1]}"
+            )
+        elif self.method == "sobol-sequence":
+            rows = qmc.Sobol(axes, rng=rng).random(count)
+        else:  # rows A, A with one column of B for each axis, B, for each sample: the order that SALib analyses
+            first, second = np.hsplit(qmc.Sobol(2 * axes, rng=rng).random(count), 2)
+            blocks = np.repeat(first[:, None, :], axes + 2, axis=1)
+            blocks[:, range(1, axes + 1), range(axes)] = second
+            blocks[:, -1] = second
+            rows = blocks.reshape(-1, axes)
+        return np.asarray(np.clip(rows, *WITHIN))
 
 
 def values_at(shares: Array, distributions: Sequence[Distribution]) -> Array:
@@ -165,68 +189,16 @@ def values_at(shares: Array, distributions: Sequence[Distribution]) -> Array:
     return np.column_stack([one.values(inside[:, index]) for index, one in enumerate(distributions)])
 
 
-def _latin_hypercube(plan: Sampling, axes: int) -> Array:
-    from scipy.stats import qmc
-
-    return np.asarray(qmc.LatinHypercube(axes, rng=np.random.default_rng(plan.seed)).random(plan.samples))
-
-
-def _random(plan: Sampling, axes: int) -> Array:
-    return np.random.default_rng(plan.seed).random((plan.samples or 0, axes))
-
-
-def _sobol_sequence(plan: Sampling, axes: int) -> Array:
-    from scipy.stats import qmc
-
-    count = plan.samples or 0
-    if count & (count - 1):
-        near = 2 ** max(count.bit_length() - 1, 0), 2 ** count.bit_length()
-        raise InputError(
-            f"sampling.samples = {count}: a Sobol' sequence needs a power of two; give {near[0]} or {near[1]}"
-        )
-    return np.asarray(qmc.Sobol(axes, rng=np.random.default_rng(plan.seed)).random(count))
-
-
-def _sobol_indices(plan: Sampling, axes: int) -> Array:
-    """Rows A, then A with one column of B for each axis, then B, for each sample: the order that SALib analyses."""
-    both = _sobol_sequence(plan, 2 * axes)
-    first, second = both[:, :axes], both[:, axes:]
-    rows = np.repeat(first[:, None, :], axes + 2, axis=1)
-    for axis in range(axes):
-        rows[:, axis + 1, axis] = second[:, axis]
-    rows[:, -1] = second
-    return rows.reshape(-1, axes)
-
-
-def _one_at_a_time(plan: Sampling, axes: int) -> Array:
-    """Medians in the first row, then two rows for each axis: its lower and its upper quantile."""
-    rows = np.full((1 + 2 * axes, axes), 0.5)
-    for axis in range(axes):
-        rows[1 + 2 * axis : 3 + 2 * axis, axis] = plan.quantiles
-    return rows
-
-
-_DRAWS: Mapping[str, Callable[[Sampling, int], Array]] = {
-    "latin-hypercube": _latin_hypercube,
-    "random": _random,
-    "sobol-sequence": _sobol_sequence,
-    "sobol-indices": _sobol_indices,
-    "one-at-a-time": _one_at_a_time,
-}
-
-
 def distribution_from(table: Mapping[str, Any]) -> tuple[Distribution, set[str]]:
     """The distribution of the table of an axis, and the keys that it takes. Raises InputError."""
     kind = table["distribution"]
     if kind not in DISTRIBUTIONS:
         raise InputError(f"distribution = {kind!r}: give one of {', '.join(map(repr, DISTRIBUTIONS))}")
     names = DISTRIBUTIONS[kind]
-    for name in names:
-        if name not in table:
-            raise InputError(f"{name} is missing: distribution = {kind!r} has {', '.join(names)}")
+    if missing := [name for name in names if name not in table]:
+        raise InputError(f"{missing[0]} is missing: distribution = {kind!r} has {', '.join(names)}")
     numbers = {name: number_of(table, name) for name in names}
-    between = table.get("between")
-    if between is not None:
+    if (between := table.get("between")) is not None:
         between = parsed(Quantity("", shape=(2,)), between, "between")
     return Distribution(kind, tuple(numbers.values()), between), {"distribution", "between", *names}
 
@@ -289,9 +261,7 @@ def axis_from(name: str, table: Any, folder: Path | None) -> Axis:
         why = "the table has such a column" if name in RESERVED else "a name has letters, digits and _ only"
         raise InputError(f"{path}: {why}; give another name")
     with prefixed(f"{path}."):
-        change, paths = _change(table)
-        axis = Axis(name, change, paths, _surfaces(table))
-        complete, used = _with_values(axis, table)
+        complete, used = _with_values(Axis(name, *_change(table), _surfaces(table)), table)
     known = {*used, "sets", "multiplies", "factors", "surfaces"}
     if extra := [key for key in table if key not in known]:
         everything = {*KEYS, "between", "low", "mode", "high", "mean", "deviation", "median", "dispersion"}
@@ -347,12 +317,12 @@ def grid(axis: Axis, values: Any, labels: Any = None) -> Axis:
         raise InputError(f"values = {_short(values)}: a value occurs twice; give each once")
     if labels is not None and (not isinstance(labels, list) or len(labels) != len(values)):
         raise InputError(f"labels = {_short(labels)}: give one for each of the {len(values)} values")
-    shown = [_label(value) for value in (values if labels is None else labels)]
-    if not all(isinstance(label, float) for label in shown):
-        shown = [
-            str(value) if isinstance(value, str | int | float) else json.dumps(value) for value in labels or values
-        ]
-    return replace(axis, values=tuple(values), labels=tuple(shown))
+    labels = values if labels is None else labels
+    if all(isinstance(label, int | float) and not isinstance(label, bool) for label in labels):
+        shown: tuple[Any, ...] = tuple(map(float, labels))
+    else:
+        shown = tuple(str(one) if isinstance(one, str | int | float) else json.dumps(one) for one in labels)
+    return replace(axis, values=tuple(values), labels=shown)
 
 
 def located(axis: Axis, folder: Path | None) -> Axis:
@@ -378,10 +348,6 @@ def _range(table: Mapping[str, Any]) -> list[float]:
         raise InputError(f"range = {value!r}: give two numbers, the smaller first")
     spaced = np.linspace(low, high, points) if spacing == "linear" else np.geomspace(low, high, points)
     return [float(number) for number in spaced]
-
-
-def _label(value: Any) -> Any:
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
 def _short(value: Any) -> str:

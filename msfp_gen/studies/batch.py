@@ -275,11 +275,13 @@ def simulate_batch(
 
     The models of all are built before the first run starts. Ctrl-C ends all runs within a few thousand steps.
 
-    scenes: all of their fields may differ. workers: number of runs at the same time; None: the number of cores that
-    this process may use. processes: use processes instead of threads: faster for short runs, where assembling the
-    result in Python takes longer than the integration in C; a script must then make this call under
-    `if __name__ == "__main__":`. strict: as in `simulate`. progress: called in the thread of the caller with the
-    number of completed scenes, and of all scenes.
+    Args:
+        scenes: the scenes; all of their fields may differ.
+        workers: number of runs at the same time; None: the number of cores that this process may use.
+        processes: use processes instead of threads: faster for short runs, where assembling the result in Python takes
+            longer than the integration in C. A script must then make this call under `if __name__ == "__main__":`.
+        strict: as in `simulate`.
+        progress: called in the thread of the caller with the number of completed scenes, and of all scenes.
 
     Returns a list of Result, or of BuildingResult for buildings, in the order of the scenes. A run that fails raises no
     error: its `status` and `message` describe the failure, and its history has the rows until then.

@@ -248,8 +248,7 @@ class Keep:
     @cached_property
     def known(self) -> dict[str, Source]:
         """Column -> where it comes from, of everything that can be kept."""
-        sources = catalogue(self.counts)
-        sources = {name: source for name, source in sources.items() if name not in _LEFT_OUT}
+        sources = {name: source for name, source in catalogue(self.counts).items() if name not in _LEFT_OUT}
         if not self.counts.bearings:
             sources |= {f"{CAPACITY_USED}_{k + 1}": Source(_CAPACITY_USED, k) for k in range(self.counts.surfaces)}
         return sources
@@ -263,14 +262,10 @@ class Keep:
 
         at: the values of the axes that hold numbers.
         """
-        reader = _Reader(result, self)
-        formulas = dict(self.formulas)
-        kept = {
-            column.name: self._evaluated(column.name, formulas[column.name], reader, at)
-            if column.name in formulas
-            else reader.value(column.name)
-            for column in self.columns()
-        }
+        reader, formulas, kept = _Reader(result, self), dict(self.formulas), {}
+        for name, _, _ in self.columns():
+            text = formulas.get(name)
+            kept[name] = reader.value(name) if text is None else self._evaluated(name, text, reader, at)
         return kept, reader.problem
 
     def _evaluated(self, name: str, text: str, reader: _Reader, at: Mapping[str, float]) -> float | None:
@@ -346,7 +341,9 @@ class _Reader:
         """The value of a quantity; None where the run has none."""
         source = self._known[name]
         if source.quantity is _CAPACITY_USED:
-            return self._capacity_used(source.place or 0)
+            surfaces, place = self.result.scene.bearing.surfaces, source.place or 0
+            gap = self.result.summary["minimum_gap"]
+            return 1.0 - float(gap[place]) / float(surfaces[place].capacity) if place < len(surfaces) else None
         value = source.value(self.result.summary, self._characterisation if source.quantity.characterised else None)
         if value is None and source.quantity.characterised and (why := source.reason(self._characterisation)):
             self.problem = f"no {name}: {why}"
@@ -375,13 +372,6 @@ class _Reader:
     @cached_property
     def _arrays(self) -> Arrays:
         return self._storage.arrays_of(self.result)
-
-    def _capacity_used(self, surface: int) -> float | None:
-        surfaces = self.result.scene.bearing.surfaces
-        if surface >= len(surfaces):
-            return None
-        capacity = float(surfaces[surface].capacity)
-        return 1.0 - float(self.result.summary["minimum_gap"][surface]) / capacity
 
     @cached_property
     def _characterisation(self) -> Any:

@@ -433,9 +433,13 @@ def _checked(table: Mapping[str, Any], folder: Path | None, progress: Progress |
     if len({axis.name for axis in axes}) < len(axes):
         raise InputError("axes: [records] makes the axes record and scale; give other names")
     sampling = _sampling(table, axes)
+    formulas = tuple(_table(table, "quantities").items())
+    for name, text in formulas:
+        if not isinstance(text, str):
+            raise InputError(f"quantities.{name} = {text!r}: give a formula in quotes, such as 'peak_sliding_1 / 0.13'")
     keep = Keep(
         _texts(table, "keep", BUILDING_KEEP if "building" in scene else DEFAULT_KEEP),
-        tuple((name, _formula(name, text)) for name, text in _table(table, "quantities").items()),
+        formulas,
         (*(axis.name for axis in axes if axis.numeric), *([INTENSITY] if intensities else [])),
     )
     if tables and "motion" not in scene:
@@ -512,9 +516,3 @@ def _texts(table: Mapping[str, Any], key: str, default: tuple[str, ...]) -> tupl
     if not isinstance(value, list | tuple) or not all(isinstance(item, str) for item in value):
         raise InputError(f"{key} = {value!r}: give {KEYS[key]} in quotes")
     return tuple(value)
-
-
-def _formula(name: str, text: Any) -> str:
-    if not isinstance(text, str):
-        raise InputError(f"quantities.{name} = {text!r}: give a formula in quotes, such as 'peak_sliding_1 / 0.13'")
-    return text

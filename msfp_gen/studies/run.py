@@ -82,13 +82,16 @@ def study(
     most. A run that fails is a row with its status and message. With processes, a script must make this call under
     `if __name__ == "__main__":`.
 
-    source: a study file (docs/studies.md), a table of the same keys, or a `Study`. output: the folder of the study:
-    `part-*.parquet` and `study.toml`; it is made if it does not exist. workers: runs at the same time; None: one for
-    each core. threads: in place of processes: they start at once, and suit few and long runs. executor: an executor
-    (`concurrent.futures`) to run on, such as that of Parsl; it stays open. dask: address or scheduler file of a Dask
-    cluster to run on. mpi: run on the other processes of `mpiexec ... -m mpi4py.futures`. shard: (i, n): only every
-    n-th chunk, from the i-th; for job arrays that share `output`. progress: called with the runs that are done,
-    earlier ones included, and all (of the shard).
+    Args:
+        source: a study file (docs/studies.md), a table of the same keys, or a `Study`.
+        output: the folder of the study: `part-*.parquet` and `study.toml`; it is made if it does not exist.
+        workers: runs at the same time; None: one for each core.
+        threads: threads instead of processes: they start at once, and suit few and long runs.
+        executor: an executor (`concurrent.futures`) to run on, such as that of Parsl; it stays open.
+        dask: address or scheduler file of a Dask cluster to run on.
+        mpi: run on the other processes of `mpiexec ... -m mpi4py.futures`.
+        shard: (i, n): only every n-th chunk, from the i-th; for job arrays that share `output`.
+        progress: called with the runs that are done, earlier ones included, and all (of the shard).
 
     Raises InputError: invalid input, or a folder with another study; nothing was computed; RunError: workers died, or
     more runs failed than `limits.failures` permits. What is done is kept.

@@ -79,10 +79,13 @@ def variations(
     table, path = scene_table(source)
     with prefixed("" if path is None else f"{path}: "):
         factory, axes = _factory(table, None if path is None else path.parent, fields, records)
-        return [
-            _variation(source, dict(zip(names, shown, strict=True)), factory.scene(values))
-            for shown, values in zip(product(*lists), product(*axes), strict=True)
-        ]
+        scenes = []
+        for shown, values in zip(product(*lists), product(*axes), strict=True):
+            scene, varied = factory.scene(values), dict(zip(names, shown, strict=True))
+            shown_values = [f"{field} = {value}" for field, value in varied.items()]
+            name = ", ".join([scene.name or Path(source).stem, *shown_values])
+            scenes.append(Variation(str(source), varied, replace(scene, name=name)))
+        return scenes
 
 
 def _factory(
@@ -94,12 +97,6 @@ def _factory(
     axes += [located(Axis(path, "sets", (path,), values=tuple(values)), folder) for path, values in fields]
     scene = with_absolute_paths(table if not records else {**table, "motion": motion_of(records[0].table)}, folder)
     return SceneFactory(Recipe(scene, tuple(axes), tables, {}, {})), [axis.values or () for axis in axes]
-
-
-def _variation(source: str | Path, varied: dict[str, Any], scene: AnyScene) -> Variation:
-    values = ", ".join(f"{path} = {value}" for path, value in varied.items())
-    name = scene.name or Path(source).stem
-    return Variation(str(source), varied, replace(scene, name=f"{name}, {values}" if values else name))
 
 
 class Row(NamedTuple):
@@ -167,7 +164,8 @@ def _sources(rows: Sequence[Row]) -> dict[str, Source]:
 def sweep_table(rows: Sequence[Row]) -> Table:
     """The rows for a terminal, 80 columns wide at most: what does not fit is only in the table that is written."""
     rows = sorted(rows)
-    paths = [path for path in dict.fromkeys(path for row in rows for path in row.varied) if _differs(rows, path)]
+    every = dict.fromkeys(path for row in rows for path in row.varied)
+    paths = [path for path in every if len(rows) == 1 or len({str(row.varied.get(path)) for row in rows}) > 1]
     scenes = {row.source for row in rows}
     leading = {"no.": [str(row.number) for row in rows]}
     if len(scenes) > 1 or not paths:
@@ -181,16 +179,16 @@ def sweep_table(rows: Sequence[Row]) -> Table:
         "verdict": [str(value_at(row.summary, "verdict.word") or "failed") for row in rows],
         "[ms]": [_number(row, "wall_time", 1e3, 0) for row in rows],
     }
-    shown = list(paths)
-    while True:
-        named = _headings(shown)
-        table = {**leading, **{named[path]: varied[path] for path in shown}, **peaks}
-        if not shown or _width(table) <= WIDTH:
+    for count in range(len(paths), -1, -1):
+        last = [path.rpartition(".")[2] for path in paths[:count]]  # enough of a path where no other ends so
+        names = [end if last.count(end) == 1 else path for path, end in zip(paths, last, strict=False)]
+        table = {**leading, **dict(zip(names, varied.values(), strict=False)), **peaks}
+        # as `rich` draws it: three characters of space for each column, and one more
+        if sum(max(map(len, (name, *cells))) + 3 for name, cells in table.items()) + 1 <= WIDTH:
             break
-        shown.pop()
     title = f"{len(rows)} runs: peak displacement u, peak force F, rims met, run time"
-    if len(shown) < len(paths):
-        title += f"\nnot shown: {', '.join(paths[len(shown) :])}; give --table FILE"
+    if count < len(paths):
+        title += f"\nnot shown: {', '.join(paths[count:])}; give --table FILE"
     return Table(title, tuple(table), list(zip(*table.values(), strict=True)))
 
 
@@ -198,22 +196,6 @@ def _number(row: Row, path: str, scale: float, digits: int) -> str:
     """A value of a summary for the terminal; a run that failed before its first row has none."""
     value = value_at(row.summary, path)
     return "-" if value is None else f"{value * scale:.{digits}f}"
-
-
-def _differs(rows: Sequence[Row], path: str) -> bool:
-    """Whether a varied field has several values, or there is one run only."""
-    return len(rows) == 1 or len({str(row.varied.get(path)) for row in rows}) > 1
-
-
-def _headings(paths: Sequence[str]) -> dict[str, str]:
-    """Short names of fields: the last part of the path where no other has it."""
-    last = [path.rpartition(".")[2] for path in paths]
-    return {path: end if last.count(end) == 1 else path for path, end in zip(paths, last, strict=True)}
-
-
-def _width(table: Mapping[str, list[str]]) -> int:
-    """Width of a terminal table with three characters of space for each column and one more, as `rich` draws it."""
-    return sum(max(map(len, (name, *cells))) + 3 for name, cells in table.items()) + 1
 
 
 def _short(text: str) -> str:

@@ -52,13 +52,17 @@ def fit(
     cores. `scipy.optimize.least_squares` makes the next step within the bounds (method "trf"). Runs begin with the
     tolerance of the scene, and go on with smaller ones until their error is small against the intervals.
 
-    scene: the bearing on its test rig, with the values at the start; the displacement of each test replaces its motion.
-    tests: files with the columns time, displacement and force, or measurements. parameters: paths, such as
-    `bearing.surfaces[*].friction`; `A=B` gives the same value to both. bounds: path -> least and largest value [SI]; by
-    default a tenth and ten times the value in the scene. offset: fit an offset of the force of each test too. columns:
-    names of the columns: see `read_measurement`. progress: called during the runs, in their threads, with the number of
-    the evaluation, its share that is done and the last deviation [N]; an exception in it ends the fit.
-    max_evaluations: at most so many evaluations in the search; tighter runs at its end are not counted.
+    Args:
+        scene: the bearing on its test rig, with the values at the start. The displacement of each test replaces its
+            motion.
+        tests: files with the columns time, displacement and force, or measurements.
+        parameters: paths, such as `bearing.surfaces[*].friction`; `A=B` gives the same value to both.
+        bounds: path -> least and largest value [SI]; by default a tenth and ten times the value in the scene.
+        offset: fit an offset of the force of each test too.
+        columns: names of the columns: see `read_measurement`.
+        progress: called during the runs, in their threads, with the number of the evaluation, its share that is done
+            and the last deviation [N]. An exception in it ends the fit.
+        max_evaluations: at most so many evaluations in the search; tighter runs at its end are not counted.
 
     Raises InputError: a file, a parameter or a bound is wrong, or runs of the scene have no gradients: one line.
     RunError: a run of the scene as it was given fails, or the fit has not converged after `max_evaluations`.

@@ -177,28 +177,20 @@ def question_of(study: Study, **changes: Any) -> Question:
         table = {key: value for key, value in table.items() if key not in goals}
     table |= {key: value for key, value in changes.items() if value is not None}
     for name, unit in (("target", ""), ("budget", "s"), ("threshold", "")):
-        if isinstance(table.get(name), str):
-            try:
-                table[name] = _number(table[name], unit)
+        text = table.get(name)
+        if isinstance(text, str):
+            try:  # a number with its unit, a plain one, or a share in percent
+                share = text.strip().removesuffix("%")
+                table[name] = to_si(text, unit) if unit else float(share) / (1 if share == text.strip() else 100)
             except ValueError as error:
-                raise InputError(f"accuracy.{name} = {table[name]!r}: {error}") from None
+                why = error if unit else "give a number, or a share such as '2 %'"
+                raise InputError(f"accuracy.{name} = {text!r}: {why}") from None
     if isinstance(table.get("models"), list):
         table["models"] = tuple(table["models"])
     question = Question(**table)
     if question.quantity is None:
         raise InputError("accuracy.quantity is missing: give a column of the study, such as 'peak_displacement'")
     return question
-
-
-def _number(text: str, unit: str) -> float:
-    """The number of a text: with a unit, or a plain one or a share in percent. Raises ValueError with the remedy."""
-    if unit:
-        return float(to_si(text, unit))
-    share = text.strip().removesuffix("%")
-    try:
-        return float(share) / (1 if share == text.strip() else 100)
-    except ValueError:
-        raise ValueError("give a number, or a share such as '2 %'") from None
 
 
 def estimate(

@@ -125,11 +125,11 @@ def parabola(x: Array, y: Array, weights: Array) -> Callable[[Array], Array]:
 
 def logistic(x: Array, y: Array, _: Array) -> Callable[[Array], Array]:
     """The logistic curve of shares y in [0, 1] over x, whose slope has a weak prior."""
-    centre, spread, scaled = _scaling(x)
+    standard = _standard(x)
     level = np.log((y.sum() + 0.5) / (len(y) - y.sum() + 0.5))
-    rows = np.stack([np.ones(len(x)), (scaled(x) - centre) / spread], axis=-1)
+    rows = np.stack([np.ones(len(x)), standard(x)], axis=-1)
     solution = _newton(rows, y, np.zeros(len(x)), np.array([level, 0.0]), np.array([1e-3, RIDGE]))
-    return lambda at: _expit(solution[0] + solution[1] * (scaled(at) - centre) / spread)
+    return lambda at: _expit(solution[0] + solution[1] * standard(at))
 
 
 def exceedance(threshold: float, extended: bool = False) -> Fit:
@@ -146,15 +146,15 @@ def exceedance(threshold: float, extended: bool = False) -> Fit:
             return logistic(x, (y >= threshold).astype(float), weights)
         logs = threshold > 0 and float(y[finite].min()) > 0
         heights, bound = (np.log(y[finite]), np.log(threshold)) if logs else (y[finite], threshold)
-        centre, spread, scaled = _scaling(x)
-        fitted = (scaled(x[finite]) - centre) / spread
+        standard = _standard(x)
+        fitted = standard(x[finite])
         straight = _regression(fitted, heights, np.ones(len(heights)), [np.asarray])
         regression = straight if extended else _within(fitted, straight)
-        left = heights - regression((scaled(x[finite]) - centre) / spread)
+        left = heights - regression(fitted)
         deviation = max(float(left.std()), 1e-3 * (float(heights.std()) or 1.0), 1e-12)
 
         def offset(at: Array) -> Array:
-            return NORMAL * (regression((scaled(at) - centre) / spread) - bound) / deviation
+            return NORMAL * (regression(standard(at)) - bound) / deviation
 
         own = offset(x)
         rows = np.stack([np.ones(len(x)), own], axis=-1)
@@ -164,15 +164,16 @@ def exceedance(threshold: float, extended: bool = False) -> Fit:
     return fit
 
 
-def _scaling(x: Array) -> tuple[float, float, Callable[[Array], Array]]:
-    """Centre and spread of x, and what they are of: its logarithm where all are above 0."""
+def _standard(x: Array) -> Callable[[Array], Array]:
+    """Values less the mean of x, over its standard deviation; of logarithms where all x are above 0."""
     low = float(x.min())
 
     def scaled(at: Array) -> Array:
         return np.asarray(np.log(np.maximum(at, low / 100)) if low > 0 else at)
 
     z = scaled(x)
-    return float(z.mean()), float(z.std()) or 1.0, scaled
+    centre, spread = float(z.mean()), float(z.std()) or 1.0
+    return lambda at: (scaled(at) - centre) / spread
 
 
 def _expit(eta: Array) -> Array:

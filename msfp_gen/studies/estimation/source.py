@@ -108,15 +108,12 @@ class StudySource:
         self.draws = Draws(study, seed)
         self.population = self.draws.population
         check_quantity(study, quantity, levels)
+        places = {level: folder if level == EXACT else folder / level for level in levels}
         self._models = {
-            level: _Model(level_study(study, level, quantity), self._folder(folder, level), quantity, self.draws, pool)
-            for level in levels
+            level: _Model(level_study(study, level, quantity), place, quantity, self.draws, pool)
+            for level, place in places.items()
         }
         self._progress = progress
-
-    @staticmethod
-    def _folder(folder: Path, level: str) -> Path:
-        return folder if level == EXACT else folder / level
 
     def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
         """As of `Source`."""
@@ -225,28 +222,23 @@ def level_study(study: Study, level: str, quantity: str) -> Study:
 
 def check_quantity(study: Study, quantity: str, levels: Sequence[str]) -> None:
     """Raise InputError: the study does not keep the quantity, or a model does not have it, or is not for the scene."""
-    known = [column.name for column in study.keep.columns() if not column.text]
-    if quantity not in known:
-        raise InputError(f"quantity = {quantity!r}: the study keeps {', '.join(known)}; give one, or add it to keep")
+    kept = [column.name for column in study.keep.columns() if not column.text]
+    if quantity not in kept:
+        raise InputError(f"quantity = {quantity!r}: the study keeps {', '.join(kept)}; give one, or add it to keep")
     factory = SceneFactory(study.recipe)
     for level in levels:
         if level == "backbone":
             check_backbone(factory.base)
-            missing = [name for name in _names_in(study.keep, quantity) if not _of_backbone(name, study)]
-            if missing:
+            known = {*QUANTITIES, *study.keep.axes}
+            if not study.keep.counts.bearings:
+                known |= {f"{name}_{k + 1}" for name in OF_SURFACES for k in range(study.keep.counts.surfaces)}
+            if missing := [name for name in _names_in(study.keep, quantity) if name not in known]:
                 raise InputError(
                     f"quantity = {quantity!r}: {missing[0]} is none of the model 'backbone'; give another quantity, or "
                     "accuracy.models = ['massless']"
                 )
         elif level != EXACT:
             SceneFactory(replace(study.recipe, scene={**study.recipe.scene, "fidelity": level}))
-
-
-def _of_backbone(name: str, study: Study) -> bool:
-    """Whether runs of the cheapest model have a quantity."""
-    if name in QUANTITIES or name in study.keep.axes:
-        return True
-    return not study.keep.counts.bearings and name.rpartition("_")[0] in OF_SURFACES
 
 
 def _names_in(keep: Keep, quantity: str) -> list[str]:
