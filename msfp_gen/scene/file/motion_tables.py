@@ -6,7 +6,6 @@ Each class is the table of one kind: its annotations are the rules of the scene 
 from __future__ import annotations
 
 import os
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -22,9 +21,12 @@ from msfp_gen.motions.prescribed import Load, Prescribed, Rotation
 if TYPE_CHECKING:
     from msfp_gen.motions.records import Record
 
+MOST_BYTES = 128 << 20  # of the motions that are kept, and of the records
+RECORDS = "MSFP_GEN_RECORDS"  # environment variable: further folders, beside that of the scene file, with records
+_LENGTH, _TIME, _COUNT = Quantity("m", above=0.0), Quantity("s", above=0.0), Quantity("", above=0.0)
+_FREQUENCY, _ANGULAR = Quantity("Hz", above=0.0), Quantity("rad/s", above=0.0)
 _TIMES = Quantity("s", least=0.0, shape=(None,))
 _FORCE, _MOMENT, _ANGLE = Quantity("N", shape=(3,)), Quantity("N m", shape=(3,)), Quantity("rad")
-_FREQUENCY = Quantity("Hz", above=0.0)
 _NONE = (0.0, 0.0, 0.0)
 Rows = tuple[tuple[float, ...], ...]
 
@@ -161,14 +163,6 @@ def table_of(history: Prescribed) -> dict[str, Any]:
     return table | ({"name": history.name} if history.name else {})
 
 
-MOST_BYTES = 128 << 20  # of the motions that are kept, and of the records
-RECORDS = "MSFP_GEN_RECORDS"  # environment variable: further folders, beside that of the scene file, with records
-_LENGTH = Quantity("m", above=0.0)
-_TIME = Quantity("s", above=0.0)
-_COUNT = Quantity("", above=0.0)
-_ANGULAR = Quantity("rad/s", above=0.0)
-
-
 @dataclass(frozen=True)
 class Paths(Text):
     """The path of a file; several: or a list of them."""
@@ -197,10 +191,14 @@ class Components(Text):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MotionTable(ABC):
-    """Fields of every kind: name, time at rest after the end of the motion [s], and the table of a base rotation."""
+class MotionTable:
+    """Fields of every kind: name, time at rest after the end of the motion [s], and the table of a base rotation.
+
+    make: the name of the constructor of `Motion`, which takes the other fields.
+    """
 
     kind: ClassVar[str]
+    make: ClassVar[str] = ""
     name: str = ""
     hold: Annotated[float | None, _TIME] = None
     rotation: Mapping[str, Any] | None = None
@@ -232,9 +230,9 @@ class MotionTable(ABC):
             text = str(error)
             raise InputError(text if text.startswith("motion") else f"motion.{text}") from None
 
-    @abstractmethod
     def _motion(self) -> Motion:
         """The motion without the time at rest and without rotation."""
+        return getattr(Motion, self.make)(**self._values())  # type: ignore[no-any-return]
 
     def _values(self, *omitted: str) -> dict[str, Any]:
         """Fields by name, less `hold`, `rotation` and the omitted ones."""
@@ -246,52 +244,40 @@ class MotionTable(ABC):
 class Harmonic(MotionTable):
     """`Motion.harmonic`: A sin(2 pi f t) after a smooth lead-in."""
 
-    kind: ClassVar[str] = "harmonic"
+    kind, make = "harmonic", "harmonic"
     amplitude: Annotated[float, _LENGTH]
-    frequency: Annotated[float, Quantity("Hz", above=0.0)]
-    direction: Annotated[float, Quantity("rad")] = 0.0
+    frequency: Annotated[float, _FREQUENCY]
+    direction: Annotated[float, _ANGLE] = 0.0
     cycles: Annotated[float, _COUNT] = 2.0
     lead_in: Annotated[float | None, _TIME] = None
-
-    def _motion(self) -> Motion:
-        return Motion.harmonic(**self._values())
 
 
 @dataclass(frozen=True, kw_only=True)
 class Circle(MotionTable):
     """`Motion.circle`: a circular path."""
 
-    kind: ClassVar[str] = "circle"
+    kind, make = "circle", "circle"
     amplitude: Annotated[float, _LENGTH]
     angular_frequency: Annotated[float, _ANGULAR]
     cycles: Annotated[float, _COUNT] = 2.0
     lead_in: Annotated[float, _TIME] = 20.0
-
-    def _motion(self) -> Motion:
-        return Motion.circle(**self._values())
 
 
 @dataclass(frozen=True, kw_only=True)
 class FigureEight(Circle):
     """`Motion.figure_eight`: a path in the form of an eight."""
 
-    kind: ClassVar[str] = "figure-eight"
-
-    def _motion(self) -> Motion:
-        return Motion.figure_eight(**self._values())
+    kind, make = "figure-eight", "figure_eight"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ramp(MotionTable):
     """`Motion.ramp`: constant acceleration."""
 
-    kind: ClassVar[str] = "ramp"
+    kind, make = "ramp", "ramp"
     acceleration: Annotated[float, Quantity("m/s^2", above=0.0)]
     duration: Annotated[float, _TIME]
-    direction: Annotated[float, Quantity("rad")] = 0.0
-
-    def _motion(self) -> Motion:
-        return Motion.ramp(**self._values())
+    direction: Annotated[float, _ANGLE] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,13 +292,13 @@ class RecordMotion(MotionTable):
     file: Annotated[str | tuple[str, ...] | None, Paths(several=True)] = None
     bundled: str | None = None
     components: Annotated[tuple[str, ...] | None, Components()] = None
-    rotated_by: Annotated[float | None, Quantity("rad")] = None
+    rotated_by: Annotated[float | None, _ANGLE] = None
     scale: Annotated[float, Quantity("")] = 1.0
     scale_to: Mapping[str, Any] | None = None
     start: Annotated[float | None, Quantity("s", least=0.0)] = None
     duration: Annotated[float | None, _TIME] = None
     correct: bool = True
-    corner: Annotated[float, Quantity("Hz", above=0.0)] = 0.05
+    corner: Annotated[float, _FREQUENCY] = 0.05
     taper: Annotated[float, _TIME] = 1.0
 
     def _motion(self) -> Motion:
