@@ -268,8 +268,7 @@ def groups_of(result: Any) -> dict[str, xr.Dataset]:
     """The groups of a file beside the dataset: matrices, motions of the ground, extremes."""
     groups = {GROUP: _group_of(to_arrays(result.scene.building), MATRICES)}
     groups |= {ground_name(i): to_pieces(motion) for i, motion in enumerate(result.scene.grounds[0])}
-    extremes = result.recorded_extremes
-    return groups if extremes is None else groups | {EXTREMES: _group_of(vars(extremes), DIMENSIONS)}
+    return groups | {EXTREMES: _group_of(vars(result.extremes), DIMENSIONS)}
 
 
 def _group_of(arrays: Arrays, dims: Dimensions) -> xr.Dataset:
@@ -297,7 +296,6 @@ def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) ->
     sizes = SIZES | {dim: len(labels) for dim, labels in labels_of(scene).items()} | {"time": root.length("time")}
     surfaces = np.array([bearing.layout.surfaces for bearing in scene.every_bearing])
     missing = np.arange(sizes["surface"]) >= surfaces[:, None]
-    extremes = _arrays_in(root, EXTREMES, DIMENSIONS, sizes, arrays) if EXTREMES in root else None
     counters: dict[str, Any] = without(COUNTER, about)
     return {
         "scene": scene,
@@ -305,7 +303,7 @@ def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) ->
         "wall_time": counters.pop("wall_time"),
         "counters": counters,
         "monitored": notes_in(about),
-        "recorded_extremes": None if extremes is None else BuildingExtremes(**extremes),
+        "extremes": BuildingExtremes(**_arrays_in(root, EXTREMES, DIMENSIONS, sizes, arrays)),
     }
 
 

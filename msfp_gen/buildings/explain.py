@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.buildings.file import AnyScene
 from msfp_gen.buildings.notes import building_doubts
 from msfp_gen.buildings.scene import BuildingScene, remaining_loads, standing_below
 from msfp_gen.common.fields import Choice, Quantity, ruled_fields
 from msfp_gen.common.tables import Table, vector, yes
-from msfp_gen.scene.bearing import Surface
+from msfp_gen.motions.motion import Motion
+from msfp_gen.motions.prescribed import Prescribed
+from msfp_gen.scene.bearing import Bearing, Surface
 from msfp_gen.scene.effect_selection import (
     GIVEN,
     EffectSelection,
@@ -24,15 +26,9 @@ from msfp_gen.scene.friction_parameters import law_parameters
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import Limits
 from msfp_gen.scene.standing import unsteady
+from msfp_gen.scene.top import NodeTop, Top
+from msfp_gen.specification.friction_laws import Law
 from msfp_gen.specification.layout import Effects
-
-if TYPE_CHECKING:
-    from msfp_gen.buildings.file import AnyScene
-    from msfp_gen.motions.motion import Motion
-    from msfp_gen.motions.prescribed import Prescribed
-    from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.scene.top import NodeTop, Top
-    from msfp_gen.specification.friction_laws import Law
 
 LISTED = 12  # frequencies of the frame that are listed
 SURFACE_COLUMNS = {

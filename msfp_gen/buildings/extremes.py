@@ -4,38 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, get_type_hints
 
 import numpy as np
 
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array, parts
-from msfp_gen.results.extremes import largest
+from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.friction_parameters import start_temperatures
-
-if TYPE_CHECKING:
-    from msfp_gen.buildings.scene import BuildingScene
-    from msfp_gen.scene.bearing import Bearing
 
 Shapes = list[tuple[str, tuple[int, ...]]]  # names and shapes of numbers that lie one after the other
 CORNERS = 4  # of the plan
 OF_SURFACES = ("sliding", "rim_force", "lift", "temperature")  # of which the largest value counts
 CONTACT = ("contact_offset", "contact_time")  # of which rows know nothing
 VECTOR = 4  # numbers of a vector: largest magnitudes along E1, E2, E3 and in the horizontal plane
-# The dimensions of the arrays of `BuildingExtremes`, and the sizes of those that are the same of all buildings.
-DIMENSIONS = {
-    **dict.fromkeys(("node_acceleration", "node_displacement"), ("node", "peak")),
-    **dict.fromkeys(("drift", "corner_drift", "storey_shear"), ("storey", "peak")),
-    "storey_torsion": ("storey",),
-    "base_twist": ("whole",),
-    **dict.fromkeys(("mean_displacement", "overturning_moment", "base_reaction"), ("peak",)),
-    "base_torsion": ("whole",),
-    "energy": ("kind",),
-    **dict.fromkeys(("bearing_displacement", "top_force"), ("bearing", "peak")),
-    "axial_force": ("bearing", "end"),
-    **dict.fromkeys((*OF_SURFACES, *CONTACT), ("bearing", "surface")),
-    "normal_force": ("bearing", "end", "surface"),
-}
+# The sizes of dimensions that are the same of all buildings.
 SIZES = {"peak": VECTOR, "whole": 1, "kind": 2, "end": 2, "order": 3}
+# Arrays with their dimensions in a file.
+Peaks = Annotated[Array, ("peak",)]
+Single = Annotated[Array, ("whole",)]
+OfNodes = Annotated[Array, ("node", "peak")]
+OfStoreys = Annotated[Array, ("storey", "peak")]
+OfBearings = Annotated[Array, ("bearing", "peak")]
+OfSurfaces = Annotated[Array, ("bearing", "surface")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,60 +45,28 @@ class BuildingExtremes:
     another has zeros in the place of the others.
     """
 
-    node_acceleration: Array
-    node_displacement: Array
-    drift: Array
-    corner_drift: Array
-    storey_shear: Array
-    storey_torsion: Array
-    base_twist: Array
-    mean_displacement: Array
-    overturning_moment: Array
-    base_reaction: Array
-    base_torsion: Array
-    energy: Array
-    bearing_displacement: Array
-    top_force: Array
-    axial_force: Array
-    sliding: Array
-    rim_force: Array
-    lift: Array
-    temperature: Array
-    contact_offset: Array
-    contact_time: Array
-    normal_force: Array
-
-    @classmethod
-    def of_rows(cls, result: Any) -> BuildingExtremes:
-        """Extremes of the rows of a `BuildingResult` alone."""
-        scene = result.scene
-        names = [node.name for node in scene.building.nodes]
-        nodes = np.reshape([result.node(name) for name in names], (len(names), len(result.time), 3, 6))
-        across = -np.moveaxis(result.bearing_displacement, 1, 0)
-        normal = np.nan_to_num(result.normal_force)
-        most = {name: np.nan_to_num(getattr(result, name)).max(axis=0) for name in OF_SURFACES}
-        force, axial = np.moveaxis(result.wrench[:, :, 1, :3], 1, 0), result.axial_force
-        base = scene.bearings[0].node
-        return cls(
-            node_acceleration=largest(nodes[:, :, 2, :3]),
-            node_displacement=largest(nodes[:, :, 0, :3] - result.ground[:, 0]),
-            drift=largest(np.moveaxis(result.drift[..., :3], 1, 0)),
-            corner_drift=largest(np.moveaxis(result.corner_drift, 0, -2)).max(axis=1, initial=0.0),
-            storey_shear=largest(np.moveaxis(result.storey_force[..., :3], 1, 0)),
-            storey_torsion=np.abs(result.storey_force[..., 5]).max(axis=0),
-            base_twist=np.abs(result.node(base)[:, 0, 5]).max(keepdims=True),
-            mean_displacement=largest(across.mean(axis=0)),
-            overturning_moment=largest(np.pad(result.overturning_moment, ((0, 0), (0, 1)))),
-            base_reaction=largest(result.base_reaction),
-            base_torsion=np.abs(result.base_torsion).max(keepdims=True),
-            energy=np.array([result.kinetic.max(), result.strain.max()]),
-            bearing_displacement=largest(across),
-            top_force=largest(force),
-            axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
-            **most,
-            **dict.fromkeys(CONTACT, np.zeros_like(most["lift"])),
-            normal_force=np.stack([normal.min(axis=0), normal.max(axis=0)], axis=1),
-        )
+    node_acceleration: OfNodes
+    node_displacement: OfNodes
+    drift: OfStoreys
+    corner_drift: OfStoreys
+    storey_shear: OfStoreys
+    storey_torsion: Annotated[Array, ("storey",)]
+    base_twist: Single
+    mean_displacement: Peaks
+    overturning_moment: Peaks
+    base_reaction: Peaks
+    base_torsion: Single
+    energy: Annotated[Array, ("kind",)]
+    bearing_displacement: OfBearings
+    top_force: OfBearings
+    axial_force: Annotated[Array, ("bearing", "end")]
+    sliding: OfSurfaces
+    rim_force: OfSurfaces
+    lift: OfSurfaces
+    temperature: OfSurfaces
+    contact_offset: OfSurfaces
+    contact_time: OfSurfaces
+    normal_force: Annotated[Array, ("bearing", "end", "surface")]
 
     @classmethod
     def of_run(cls, scene: BuildingScene, recorded: Array, kept: Sequence[Shapes]) -> BuildingExtremes:
@@ -136,6 +95,7 @@ class BuildingExtremes:
         def of_bearings(name: str) -> list[Array]:
             return [values[f"{name} {i}"] for i in range(len(kept))]
 
+        radii = [bearing.arrays()["radius"] for bearing in scene.every_bearing]
         return cls(
             **{name: values[name] for name in list(vectors)[:4]},
             storey_torsion=values["torsion"][:, 2],
@@ -153,20 +113,17 @@ class BuildingExtremes:
             rim_force=padded(of_bearings("most rim")),
             lift=padded([lift_of(values) for values in of_bearings("least compression")]),
             contact_offset=padded(
-                [
-                    one.bearing.arrays()["radius"] * contacts[:, 0]
-                    for one, contacts in zip(scene.bearings, of_bearings("contact"), strict=True)
-                ]
+                [r * contact[:, 0] for r, contact in zip(radii, of_bearings("contact"), strict=True)]
             ),
-            contact_time=padded([contacts[:, 1] for contacts in of_bearings("contact")]),
-            temperature=padded(
-                [
-                    temperature_of(one.bearing, hottest)
-                    for one, hottest in zip(scene.bearings, of_bearings("most temperature"), strict=True)
-                ]
-            ),
+            contact_time=padded([contact[:, 1] for contact in of_bearings("contact")]),
+            temperature=padded(list(map(temperature_of, scene.every_bearing, of_bearings("most temperature")))),
             normal_force=np.stack([padded(of_bearings(f"{word} normal")) for word in ("least", "most")], axis=1),
         )
+
+
+DIMENSIONS = {
+    name: hint.__metadata__[0] for name, hint in get_type_hints(BuildingExtremes, include_extras=True).items()
+}
 
 
 def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:

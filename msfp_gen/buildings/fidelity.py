@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msfp_gen.buildings.building import Building
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.errors import InputError
 from msfp_gen.scene.fidelity import LEVEL, LOOSE, equivalent_pendulum, implicit_solver, labelled
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import Top
 from msfp_gen.specification.layout import Effects
-
-if TYPE_CHECKING:
-    from msfp_gen.buildings.scene import BuildingScene
 
 
 def building_at_fidelity(scene: BuildingScene, word: str) -> BuildingScene | Scene:

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.note import RISING, Note
 from msfp_gen.scene.effect_selection import LEAST_DAMPING, USUAL_DAMPING, doubtful_values, ringing
 from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.standing import unsteady
-
-if TYPE_CHECKING:
-    from msfp_gen.buildings.building import Building
 
 ENERGY_LIMIT = 0.02  # error of the energy balance of the building over its largest term, above which a note is written
 GATHERED = ("inertia", "heat", "law_speed", "law_load", "law_temperature")  # kinds

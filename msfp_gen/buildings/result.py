@@ -16,18 +16,16 @@ from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.summary import BuildingCharacterisation
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
-from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import Storage
-from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Event
+from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Event, Extremes
 from msfp_gen.results.note import Note
 from msfp_gen.results.result import AnyResult, Curve, OneBearing, Rows
 from msfp_gen.results.summary import summary_of_bearing, time_row
+from msfp_gen.scene.bearing import Bearing
+from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.specification.layout import Effects
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,7 +44,7 @@ class BuildingResult(AnyResult):
     dissipated: in each bearing; stored: in each bearing, with the springs of its interface; damped: by the damping of
     the building; received: work of the bearings on the building, by their forces beyond those at rest; input: work of
     the ground. counters: of the work of the solver. monitored: notes of the monitors of the bearings, each with the
-    number of its bearing. recorded_extremes: over all steps; None: not recorded. status: "ok" or the name of a failure;
+    number of its bearing. extremes: over all steps. status: "ok" or the name of a failure;
     message: one line of text, "" for a run that succeeded. provenance: versions with which the result was computed.
     wall_time [s].
     """
@@ -72,8 +70,8 @@ class BuildingResult(AnyResult):
     input: Array
     support: Array
     counters: dict[str, int]
+    extremes: BuildingExtremes
     monitored: tuple[Note, ...] = ()
-    recorded_extremes: BuildingExtremes | None = None
     status: str = "ok"
     message: str = ""
     provenance: dict[str, str] = field(default_factory=dict)
@@ -89,11 +87,6 @@ class BuildingResult(AnyResult):
         """Messages of the monitors in order of time; each names its bearing (docs/buildings.md)."""
         error, row = self.energy_error
         return notes_of(self.scene, self.monitored, error, float(self.time[row]))
-
-    @cached_property
-    def extremes(self) -> BuildingExtremes:
-        """Extremes over all steps, or of the rows where the run did not record them."""
-        return self.recorded_extremes or BuildingExtremes.of_rows(self)
 
     def node(self, name: str) -> Array:
         """Displacement, velocity and acceleration of a node: ndarray, shape (k, 3, 6), [m], [rad] and per s, s^2."""

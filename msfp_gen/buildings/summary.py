@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from msfp_gen.buildings.building import Building
+from msfp_gen.buildings.extremes import BuildingExtremes
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.results.characterise import Characterisation, characterised, effective_period
-from msfp_gen.results.extremes import by_axis
+from msfp_gen.results.history import by_axis
 from msfp_gen.results.loops import ForcePath, rests
 from msfp_gen.results.summary import summary_of_run
-
-if TYPE_CHECKING:
-    from msfp_gen.buildings.building import Building
-    from msfp_gen.buildings.extremes import BuildingExtremes
 
 
 def summarise(result: Any) -> dict[str, Any]:

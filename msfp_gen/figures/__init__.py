@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures.bearing import (
     moving_axes,
     plot_energy,
@@ -43,13 +44,12 @@ from msfp_gen.figures.style import (
     panels,
 )
 from msfp_gen.figures.work_precision import plot_work_precision
+from msfp_gen.results.run_data import RunData
 from msfp_gen.results.sign import using_sign
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from msfp_gen.buildings.result import BuildingResult
-    from msfp_gen.results.run_data import RunData
 
 __all__ = [
     "BUILDING_FIGURES",

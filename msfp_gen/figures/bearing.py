@@ -38,15 +38,15 @@ from msfp_gen.figures.style import (
 )
 from msfp_gen.results.geometry import friction_circles, poses, sections, slider_radius
 from msfp_gen.results.joining import at_times
+from msfp_gen.results.run_data import BearingData, RunData
 from msfp_gen.results.sign import shown_sign
-from msfp_gen.results.sliding import intervals, rims_in_contact, separated, sliding_surfaces
+from msfp_gen.results.sliding import intervals, rims_in_contact, sliding_surfaces
 from msfp_gen.results.summary import SYMBOLS, is_monotonic, transitions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from msfp_gen.results.run_data import BearingData, RunData
 
 SIDE = 0.02  # least displacement along a horizontal axis that is drawn, over the largest
 
@@ -197,7 +197,7 @@ def draw_bars(axes: Axes, result: RunData) -> None:
     while it is separated. The share of time in which it slides stands to the right.
     """
     history = result.history
-    slides, on_rim, apart = sliding_surfaces(history), rims_in_contact(history), separated(history)
+    slides, on_rim, apart = sliding_surfaces(history), rims_in_contact(history), history.separated
     span = float(history.time[-1] - history.time[0])
     for surface in range(1, history.surfaces + 1):
         flags = slides[:, surface - 1]
@@ -360,7 +360,7 @@ def eccentricity(result: RunData) -> Array:
     axes = where.basis[:, sliders, 2]
     arm = where.contact - where.centre
     off: Array = np.linalg.norm(arm - np.sum(arm * axes, axis=-1, keepdims=True) * axes, axis=-1)
-    return np.where(separated(result.history), np.nan, off)
+    return np.where(result.history.separated, np.nan, off)
 
 
 def _draw_offsets(figure: SubFigure, result: RunData) -> None:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures.style import (
     COLOURS,
@@ -33,8 +35,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.buildings.result import BuildingResult
-    from msfp_gen.buildings.scene import BuildingScene
 
 ORBIT = 0.42  # radius of the largest orbit in the plan, over the least distance of two bearings
 ROUND = (1, 2, 5)  # magnifications are these times a power of ten

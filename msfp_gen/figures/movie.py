@@ -42,13 +42,13 @@ from msfp_gen.figures.style import (
 from msfp_gen.motions.checks import positive
 from msfp_gen.results.geometry import Section, sections
 from msfp_gen.results.joining import at_times, checked_times
+from msfp_gen.results.run_data import RunData
 from msfp_gen.results.sign import shown_sign
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.results.run_data import RunData
 
 BELOW = 2.7  # height of loop and bars [inch]
 AROUND, TALLEST = 1.55, 4.5  # height of title, legend and labels of the section, and of the section itself [inch]

@@ -28,13 +28,13 @@ from msfp_gen.figures.style import (
     plain,
     subscript,
 )
+from msfp_gen.motions.records import Corrected, Record
 from msfp_gen.motions.records.record import G
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.motions.records import Corrected, Record
 
 ROOM = 1.25  # height of a panel over the peak of the corrected motion; the raw motion may leave the panel
 BLANK = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5}  # behind a note

@@ -27,14 +27,14 @@ from msfp_gen.figures.style import (
 from msfp_gen.results.geometry import Section, sections
 from msfp_gen.results.geometry import friction_circles as circle_radii
 from msfp_gen.results.joining import at_times
+from msfp_gen.results.run_data import RunData
 from msfp_gen.results.sign import shown_sign
-from msfp_gen.results.sliding import rims_in_contact, separated, sliding_surfaces
+from msfp_gen.results.sliding import rims_in_contact, sliding_surfaces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.results.run_data import RunData
 
 STEEL = ("#AEB6C0", "#DCE1E7")  # colours of the plates and of the sliders
 WIDTH = 7.4  # of the section in the figure [inch]
@@ -108,7 +108,7 @@ class SectionDrawing:
         history, last = then.history, len(section.bodies) - 1
         self.history = history
         self.slides, self.on_rim = sliding_surfaces(history), rims_in_contact(history)
-        self.apart = separated(history)
+        self.apart = history.separated
         self.bodies: list[Any] = []
         for body, polygon in enumerate(section.bodies):
             steel = STEEL[0 < body < last]

@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output, replacing
 from msfp_gen.results.history import Event
+from msfp_gen.results.run_data import BearingData
 from msfp_gen.results.sign import shown_sign
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from msfp_gen.results.run_data import BearingData
 
 # The palette of Okabe and Ito, which can be distinguished in print and by colour-blind readers.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

@@ -15,16 +15,16 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
 from msfp_gen.common.version import __version__
 from msfp_gen.results.files import COUNTER, PROVENANCE, without
+from msfp_gen.results.history import Event
 from msfp_gen.results.note import by_importance
+from msfp_gen.results.result import AnyResult
 from msfp_gen.results.run_data import BearingData
+from msfp_gen.scene.bearing import Bearing
 
 if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from msfp_gen.results.history import Event
-    from msfp_gen.results.result import AnyResult
-    from msfp_gen.scene.bearing import Bearing
 
 MILLI, KILO = 1e3, 1e-3
 MACHINE_KEYS = ("build_seconds",)  # keys of the provenance that depend on the machine

@@ -21,11 +21,12 @@ from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.common.version import __version__
 from msfp_gen.figures.style import COLOURS
-from msfp_gen.jit.build import runtime_sources
+from msfp_gen.jit.build import BuildInfo, runtime_sources
 from msfp_gen.jit.compiler import FLAGS, Log, Step, zig_program
 from msfp_gen.model.model import Model
 from msfp_gen.report.content import script_data
 from msfp_gen.report.frames import pieces
+from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import RigTop
 from msfp_gen.simulation.start import start_run
 from msfp_gen.specification import contract
@@ -33,9 +34,6 @@ from msfp_gen.specification.layout import Effects, ModelSpec
 
 if TYPE_CHECKING:
     from types import ModuleType
-
-    from msfp_gen.jit.build import BuildInfo
-    from msfp_gen.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import base64
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures import COLOURS
 from msfp_gen.figures.building import DEPTH, height_of, level_of, plan_of, size_of
 from msfp_gen.results.geometry import POINTS, Poses, friction_circles, outline, poses
 from msfp_gen.results.history import History
 from msfp_gen.results.joining import at_times
-from msfp_gen.results.sliding import separated, sliding_surfaces
-
-if TYPE_CHECKING:
-    from msfp_gen.buildings.result import BuildingResult
-    from msfp_gen.results.result import Result
-    from msfp_gen.scene.bearing import Bearing
+from msfp_gen.results.result import Result
+from msfp_gen.results.sliding import sliding_surfaces
+from msfp_gen.scene.bearing import Bearing
 
 FRAMES = 1500  # instants; 0.5 kB each for a triple pendulum, and more than a screen has pixel columns
 FEWEST = 600  # least number of instants, so that the motion looks continuous
@@ -119,7 +117,7 @@ def states(history: History) -> Array:
     """State of every surface as index into `STATES`, shape (T, n-1) [-]."""
     result = np.where(sliding_surfaces(history), 1.0, 0.0)
     result[history.gap <= 0] = 2.0
-    result[separated(history) | (history.normal_force <= 0)] = 3.0
+    result[history.separated | (history.normal_force <= 0)] = 3.0
     return result
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,12 +31,10 @@ from msfp_gen.report.content import (
     summary_page,
 )
 from msfp_gen.report.frames import FRAMES, SCALES, building_view, view
+from msfp_gen.results.result import Result
+from msfp_gen.studies.calibration import Estimate, Fit, FittedTest
 from msfp_gen.studies.calibration.fit_result import correlation_table, estimate_table, residual_table
 from msfp_gen.studies.calibration.intervals import lag_one
-
-if TYPE_CHECKING:
-    from msfp_gen.results.result import Result
-    from msfp_gen.studies.calibration import Estimate, Fit, FittedTest
 
 NO_TITLE = TitleBlock()
 Progress = Callable[[float, float], None]

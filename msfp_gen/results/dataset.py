@@ -11,17 +11,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.common.errors import InputError
-from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import COUNTER, REMEDY, WORDS, attributes_of, motion_in, notes_in, without
-from msfp_gen.results.gradient import ERROR, EVENTS, SERIES, Gradients, energy_terms
+from msfp_gen.results.gradient import ERROR, EVENTS, Gradients, energy_terms
 from msfp_gen.results.history import (
     ENERGY,
     ENERGY_BELOW,
     LABELS,
+    SERIES,
     STACK,
     BearingRows,
     Counters,
     Event,
+    Extremes,
     History,
     quantities,
 )

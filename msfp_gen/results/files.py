@@ -23,6 +23,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output, replacing, write_bytes
 from msfp_gen.common.tables import parquet_bytes
+from msfp_gen.motions.motion import Motion
 from msfp_gen.results.note import Note
 from msfp_gen.results.sign import DEFAULT, VARIABLES, sign_of
 from msfp_gen.results.stored_group import ArrayDigest, Attribute, StoredGroup, digest, seal, stored_groups
@@ -31,7 +32,6 @@ from msfp_gen.results.variables import Arrays, Places, columns_of
 if TYPE_CHECKING:
     import xarray as xr
 
-    from msfp_gen.motions.motion import Motion
 
 COUNTER, PROVENANCE = "counter_", "provenance_"  # prefixes of the attributes with counters and provenance
 DIGEST = "digest"  # attribute: of all values that are read

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import asin, cos, sin
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.results.sliding import Flags, separated
-
-if TYPE_CHECKING:
-    from msfp_gen.results.history import History
-    from msfp_gen.results.run_data import RunData
-    from msfp_gen.scene.bearing import Bearing
+from msfp_gen.results.history import History
+from msfp_gen.results.run_data import RunData
+from msfp_gen.results.sliding import Flags
+from msfp_gen.scene.bearing import Bearing
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +57,7 @@ def poses(result: RunData) -> Poses:
     contact = centre - signs * bearing.arrays()["radius"][:, None] * normal  # (3.14); concave down: + R
     rim_direction = _rim_directions(bearing, basis[:, :, 2])
     rim = _rim_points(bearing, basis[:, :, 2], bottom, top, rim_direction)
-    force = np.where(separated(history)[..., None], 0.0, history.interface_force)
+    force = np.where(history.separated[..., None], 0.0, history.interface_force)
     rim_force = -history.rim_force[..., None] * rim_direction  # (3.22), on the body above
     moment = np.cross(contact - centre, force - rim_force) + np.cross(rim - centre, rim_force)
     square = np.sum(force * force, axis=-1, keepdims=True)

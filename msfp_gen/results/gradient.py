@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.results.extremes import LEAST, Extremes
-from msfp_gen.results.history import ENERGY
-
-if TYPE_CHECKING:
-    from msfp_gen.results.history import History
-    from msfp_gen.scene.parameters import Parameter
+from msfp_gen.results.history import ENERGY, LEAST, SERIES, Extremes, History, series
+from msfp_gen.scene.parameters import Parameter
 
 ENERGIES = ("kinetic", "potential", "restraint", "rim_stored", "seat_stored")  # of the state; the others are integrals
 ERROR = "_error"  # ends the name of the variable with the error of a derivative
@@ -55,21 +50,6 @@ class Gradients:
         return largest
 
 
-# Extreme -> field of `History`, and whether it is the magnitude of a vector, by axis or not.
-SERIES = {
-    "displacement": ("displacement", "axes"),
-    "top_force": ("top_force", "axes"),
-    "sliding": ("sliding", ""),
-    "gap": ("gap", ""),
-    "slip_speed": ("slip_velocity", "length"),
-    "least_normal": ("normal_force", ""),
-    "most_normal": ("normal_force", ""),
-    "temperature": ("temperature", ""),
-    "least_friction": ("friction_coefficient", ""),
-    "most_friction": ("friction_coefficient", ""),
-}
-
-
 def gradients_of_extremes(gradients: Gradients, history: History, recorded: Extremes) -> dict[str, Array]:
     """Derivatives of `RunData.extremes` by name, each of shape (k, number of values) [SI]."""
     derivatives = {}
@@ -78,25 +58,25 @@ def gradients_of_extremes(gradients: Gradients, history: History, recorded: Extr
         if values is None:
             continue
         steps = np.array([getattr(extremes, name) for extremes in gradients.extremes])
-        series, slopes = _series(name, gradients, history)
+        values_of_rows, slopes = series(name, history), _slopes(name, gradients, history)
+        assert values_of_rows is not None
         sign = -1.0 if name in LEAST else 1.0
-        row = (sign * series).argmax(axis=0)
-        columns = np.arange(series.shape[1])
-        beyond = sign * (series[row, columns] - values) > 0
+        row = (sign * values_of_rows).argmax(axis=0)
+        columns = np.arange(values_of_rows.shape[1])
+        beyond = sign * (values_of_rows[row, columns] - values) > 0
         derivatives[name] = np.where(beyond, slopes[:, row, columns], steps)
     return derivatives
 
 
-def _series(name: str, gradients: Gradients, history: History) -> tuple[Array, Array]:
-    """The values of which an extreme is taken, shape (T, m), and their derivatives, (k, T, m)."""
+def _slopes(name: str, gradients: Gradients, history: History) -> Array:
+    """Derivatives of the values of which an extreme is taken, `series`, shape (k, T, m) [SI]."""
     field, kind = SERIES[name]
     values, slopes = getattr(history, field), gradients.arrays[field]
     if not kind:
-        return values, slopes
+        return slopes
     size = np.hypot(values[..., 0], values[..., 1])
     safe = np.where(size > 0, size, 1.0)
-    length = (values[..., 0] * slopes[..., 0] + values[..., 1] * slopes[..., 1]) / safe
+    length: Array = (values[..., 0] * slopes[..., 0] + values[..., 1] * slopes[..., 1]) / safe
     if kind == "length":
-        return size, length
-    axes = np.concatenate([np.abs(values), size[..., None]], axis=-1)
-    return axes, np.concatenate([np.sign(values) * slopes, length[..., None]], axis=-1)
+        return length
+    return np.concatenate([np.sign(values) * slopes, length[..., None]], axis=-1)

@@ -1,4 +1,4 @@
-"""The rows of a run as NumPy arrays, its events and counters.
+"""The rows of a run as NumPy arrays, its events and counters, and its extremes, which do not depend on the rows.
 
 The annotations of `BearingRows` and `History` give dimensions, unit and meaning of every quantity. The check of shapes
 here and the dataset in `dataset.py` are based on them.
@@ -6,15 +6,17 @@ here and the dataset in `dataset.py` are based on them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from functools import cache
-from typing import Annotated, ClassVar, Literal, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Literal, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.errors import InputError
+from msfp_gen.specification import contract
 
 # Labels of the dimensions of fixed length. The length of `body` and `surface` is the number of surfaces, n - 1.
 LABELS: dict[str, tuple[str, ...]] = {
@@ -119,6 +121,11 @@ class BearingRows:
     def surfaces(self) -> int:
         """Number of surfaces, n - 1."""
         return int(self.normal_force.shape[1])
+
+    @property
+    def separated(self) -> NDArray[np.bool_]:
+        """Whether each surface is separated in each row, ndarray of bool, shape (T, n-1); never without `uplift`."""
+        return self.lift > 0
 
     @property
     def dissipated(self) -> Array:
@@ -228,3 +235,114 @@ class Counters:
     other_starts: int = 0
     quasistatic_starts: int = 0
     wall_time: float = 0.0
+
+
+LEAST = {extreme.name for extreme in contract.EXTREMES if extreme.least}  # of all others the largest counts
+# Extreme -> field of `History` of which it is taken, and whether it is a magnitude: along each axis, or of the vector.
+SERIES = {
+    "displacement": ("displacement", "axes"),
+    "top_force": ("top_force", "axes"),
+    "sliding": ("sliding", ""),
+    "gap": ("gap", ""),
+    "slip_speed": ("slip_velocity", "length"),
+    "least_normal": ("normal_force", ""),
+    "most_normal": ("normal_force", ""),
+    "temperature": ("temperature", ""),
+    "least_friction": ("friction_coefficient", ""),
+    "most_friction": ("friction_coefficient", ""),
+}
+
+
+def series(name: str, history: History) -> Array | None:
+    """The values of which an extreme is taken, shape (T, m) [SI]; None where the rows do not have them."""
+    field, kind = SERIES[name]
+    values: Array | None = getattr(history, field)
+    if values is None or not kind:
+        return values
+    size = np.hypot(values[..., 0], values[..., 1])
+    if kind == "length":
+        return np.where(history.separated, 0.0, size)
+    return np.concatenate([np.abs(values), size[..., None]], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Extremes:
+    """Extremes of a run.
+
+    displacement [m], top_force [N]: largest magnitude along E1, E2, E3 and in the horizontal plane, shape (4,).
+    Per surface, shape (n-1,): sliding, the largest, and gap, the least [m]; least_normal, most_normal [N]; slip_speed,
+    the largest, while the surface is closed [m/s], None of a bearing of a building; least_friction, most_friction,
+    where a friction law acts; temperature, the highest, where it heats [degC]; rim_force [N] and lift [m], the largest,
+    which a bearing that is not below a building records in rows alone; contact_offset, the distance of a loaded contact
+    from the axis of its slider [m], and contact_time [s], of a bearing of a building alone.
+    """
+
+    displacement: Array
+    top_force: Array
+    sliding: Array
+    gap: Array
+    least_normal: Array
+    most_normal: Array
+    slip_speed: Array | None = None
+    least_friction: Array | None = None
+    most_friction: Array | None = None
+    temperature: Array | None = None
+    rim_force: Array | None = None
+    lift: Array | None = None
+    contact_offset: Array | None = None
+    contact_time: Array | None = None
+
+    @classmethod
+    def of_rows(cls, history: History) -> Extremes:
+        """Extremes of the rows alone."""
+        extremes: dict[str, Any] = {}
+        for name in SERIES:
+            if (values := series(name, history)) is not None:
+                extremes[name] = values.min(axis=0) if name in LEAST else values.max(axis=0)
+        return cls(**extremes, rim_force=history.rim_force.max(axis=0), lift=history.lift.max(axis=0))
+
+    @classmethod
+    def of_run(cls, numbers: Sequence[tuple[str, tuple[int, ...]]], recorded: Array, azimuth: float) -> Extremes:
+        """Extremes that a compiled run recorded.
+
+        numbers: name and shape of each, `EXTREMES` of the extension. recorded: one after the other. azimuth: of the
+        frame of a planar model [rad], in which all horizontal vectors are along E1.
+        """
+        extremes = {name: values.ravel() for name, values in parts(recorded, numbers).items()}
+        if azimuth:
+            for name in ("displacement", "top_force"):
+                along, _, vertical, radial = extremes[name]
+                extremes[name] = np.array(
+                    [along * abs(np.cos(azimuth)), along * abs(np.sin(azimuth)), vertical, radial]
+                )
+        return cls(**extremes)
+
+    @classmethod
+    def of_table(cls, table: dict[str, Any]) -> Extremes:
+        """The inverse of `table`."""
+        return cls(**{name: np.array(values, dtype=float) for name, values in table.items()})
+
+    @property
+    def table(self) -> dict[str, list[float]]:
+        """As plain data; what was not recorded is left out."""
+        return {name: value.tolist() for name, value in self.arrays.items()}
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """What was recorded, by name; see `Extremes` for shapes and units."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {name: value for name, value in values.items() if value is not None}
+
+    def __or__(self, other: Extremes) -> Extremes:
+        """Extremes of both."""
+        extremes: dict[str, Any] = {}
+        for name in (f.name for f in fields(self)):
+            one, two = getattr(self, name), getattr(other, name)
+            known = [value for value in (one, two) if value is not None]
+            extremes[name] = (np.min if name in LEAST else np.max)(known, axis=0) if known else None
+        return Extremes(**extremes)
+
+
+def by_axis(magnitudes: Array) -> dict[str, float]:
+    """Largest magnitudes by axis and in the horizontal plane, shape (4,), as plain data."""
+    return dict(zip((*LABELS["axis"], "radial"), magnitudes.tolist(), strict=True))

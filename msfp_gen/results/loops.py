@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,10 +14,8 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.history import first_peak
 from msfp_gen.results.run_data import BearingData, RunData
-from msfp_gen.results.sliding import separated, slides_over
-
-if TYPE_CHECKING:
-    from msfp_gen.scene.bearing import Bearing
+from msfp_gen.results.sliding import slides_over
+from msfp_gen.scene.bearing import Bearing
 
 REVERSAL = 0.02  # least reverse motion after a turning point, over the range of the run
 CLOSURE = 0.05  # largest distance between start and end of a closed cycle, over its range
@@ -244,7 +242,7 @@ def surface_demands(one: BearingData, rows: slice | None = None) -> tuple[Surfac
 def _slips(result: RunData, rows: slice, whole: bool) -> tuple[Array, Array, Array]:
     """Largest slip velocity [m/s] and friction power [W], and its integral [J], of every surface, shape (n-1,) each."""
     history, fastest = result.history, result.extremes.slip_speed
-    speed = np.where(separated(history), 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
+    speed = np.where(history.separated, 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
     power = result.friction_coefficient[rows] * history.normal_force[rows] * speed
     heat = np.asarray(np.trapezoid(power, history.time[rows], axis=0))
     return (fastest if whole and fastest is not None else speed.max(axis=0)), power.max(axis=0), heat

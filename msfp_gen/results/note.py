@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
-from msfp_gen.scene.effect_switching import JAM_STATUSES, REQUIRED_EFFECTS
+from msfp_gen.scene.effect_switching import JAM_STATUSES, REQUIRED_EFFECTS, Ending
 from msfp_gen.scene.friction_parameters import RANGES, published_softening
-
-if TYPE_CHECKING:
-    from msfp_gen.scene.effect_switching import Ending
-    from msfp_gen.specification.layout import Effects
+from msfp_gen.specification.layout import Effects
 
 
 @dataclass(frozen=True)

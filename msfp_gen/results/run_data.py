@@ -13,16 +13,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import ResultFiles
-from msfp_gen.results.history import BearingRows, Counters, Event, History
-
-if TYPE_CHECKING:
-    from msfp_gen.results.gradient import Gradients
-    from msfp_gen.results.note import Note
-    from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.scene.scene import Scene
-    from msfp_gen.specification.layout import Effects
+from msfp_gen.results.gradient import Gradients
+from msfp_gen.results.history import BearingRows, Counters, Event, Extremes, History
+from msfp_gen.results.note import Note
+from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.scene import Scene
+from msfp_gen.specification.layout import Effects
 
 
 class BearingData(ResultFiles):

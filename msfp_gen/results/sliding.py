@@ -48,16 +48,10 @@ def slides_over(slip: Array, plastic: Array) -> Flags:
 
 def sliding_surfaces(history: History) -> Flags:
     """Whether each surface slides in each row, ndarray of bool, shape (T, n-1); never while it is separated."""
-    state, velocity = history.friction_state, np.where(separated(history)[..., None], 0.0, history.slip_velocity)
+    state, velocity = history.friction_state, np.where(history.separated[..., None], 0.0, history.slip_velocity)
     mobilised = np.linalg.norm(state, axis=-1) >= MOBILISED
     opposes = np.sum(state * velocity, axis=-1) > 0  # friction is -mu N (Y, Z)
     flags: Flags = mobilised & opposes & (slip_shares(np.linalg.norm(velocity, axis=-1)) >= INSTANT_SHARE)
-    return flags
-
-
-def separated(history: BearingRows) -> Flags:
-    """Whether each surface is separated in each row, ndarray of bool, shape (T, n-1); never without `uplift`."""
-    flags: Flags = history.lift > 0
     return flags
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,16 +12,13 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.results.dataset import gradients_of
-from msfp_gen.results.extremes import by_axis
+from msfp_gen.results.files import ResultFiles
 from msfp_gen.results.gradient import Gradients, gradients_of_extremes
-from msfp_gen.results.history import LABELS, BearingRows, History
+from msfp_gen.results.history import LABELS, BearingRows, History, by_axis
+from msfp_gen.results.run_data import BearingData, RunData
 from msfp_gen.results.sliding import SHARE, merged, open_times, slip_shares
-
-if TYPE_CHECKING:
-    from msfp_gen.results.files import ResultFiles
-    from msfp_gen.results.run_data import BearingData, RunData
-    from msfp_gen.scene.bearing import Surface
-    from msfp_gen.scene.parameters import Parameter
+from msfp_gen.scene.bearing import Surface
+from msfp_gen.scene.parameters import Parameter
 
 WINDOW = 2e-4  # displacement over which shares of sliding are taken [m]
 MONOTONIC = 1e-3  # largest reverse or transverse motion of a monotonic run, over the largest displacement

@@ -6,19 +6,17 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.results.run_data import BearingData
 from msfp_gen.results.sliding import open_times
+from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.friction_parameters import start_temperatures
 from msfp_gen.scene.scene_fields import Limits
-
-if TYPE_CHECKING:
-    from msfp_gen.common.arrays import Array
-    from msfp_gen.scene.bearing import Bearing
 
 RIM_SHARE = 1 / 3  # rim force over the axial load, up to which the spring of a rim was compared
 SCALES = {"N": (1e-3, "kN"), "m": (1e3, "mm")}  # unit -> factor and unit of texts

@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import reduce
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -25,15 +25,11 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.time_grid import TimeGrid, snapped
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.scene.effect_switching import Ending, monitor_options, next_effects, stopping_monitors
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.solver import Solver
 from msfp_gen.simulation.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.specification.contract import WORKS, names
 from msfp_gen.specification.layout import Auto, Effects
-
-if TYPE_CHECKING:
-    from msfp_gen.buildings.scene import BuildingScene
-    from msfp_gen.model.compiled import Port
-    from msfp_gen.scene.scene import Scene
-    from msfp_gen.scene.solver import Solver
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,7 +368,7 @@ def result_of(run: BuildingRun) -> BuildingResult:
         support=rows["ground"][:, run.scene.grounds[1]],
         counters=run.run.counts,
         monitored=run.notes,
-        recorded_extremes=run.extremes if len(rows["time"]) else None,
+        extremes=run.extremes,
     )
 
 

@@ -14,16 +14,14 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import check_folder, clear_leftovers, write_bytes
+from msfp_gen.model.model import Model
+from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.rows import RowFile, rows_beside
-
-if TYPE_CHECKING:
-    from msfp_gen.model.model import Model
-    from msfp_gen.scene.scene import Scene
 
 MAGIC = b"msfp-gen checkpoint 2\n"
 EVERY = 60.0  # wall time between two checkpoints [s]

@@ -8,37 +8,39 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import pi
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
-from msfp_gen.model.compiled import bodies_and_surfaces, settlements, top_values
+from msfp_gen.model.compiled import Run, bodies_and_surfaces, settlements, top_values
+from msfp_gen.model.model import Model
 from msfp_gen.model.plane import motion_in_plane, out_of_plane, wrench_in_plane
+from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.time_grid import snapped
-from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.gradient import EVENTS, Gradients, energy_terms, gradients_of_extremes
+from msfp_gen.results.history import Event, Extremes
 from msfp_gen.results.note import Note
+from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import quasistatic, slider_period
 from msfp_gen.scene.friction_parameters import derived_slopes, law_parameters
 from msfp_gen.scene.parameters import Parameter, parameters_of
+from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.standing import SPRINGS, stiffness_slopes
 from msfp_gen.scene.top import is_sprung, load_values
-from msfp_gen.simulation.rows import unpacked
-from msfp_gen.simulation.start import Frame, first_load, needs_settling, state_in_plane, time_grid, wrench_pieces
+from msfp_gen.simulation.rows import Segment, unpacked
+from msfp_gen.simulation.start import (
+    Frame,
+    StartSlopes,
+    first_load,
+    needs_settling,
+    state_in_plane,
+    time_grid,
+    wrench_pieces,
+)
 from msfp_gen.specification import contract
-
-if TYPE_CHECKING:
-    from msfp_gen.model.compiled import Run
-    from msfp_gen.model.model import Model
-    from msfp_gen.motions.motion import Motion
-    from msfp_gen.results.history import Event
-    from msfp_gen.results.result import Result
-    from msfp_gen.scene.scene import Scene
-    from msfp_gen.simulation.rows import Segment
-    from msfp_gen.simulation.start import StartSlopes
-    from msfp_gen.specification.layout import Effects
+from msfp_gen.specification.layout import Effects
 
 _STATE = ("q", "v", "h")
 _MOMENTS = ("inertia_transverse", "inertia_axial")

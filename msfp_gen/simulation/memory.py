@@ -12,13 +12,10 @@ import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.history import ENERGY, LABELS, STACK, quantities
-
-if TYPE_CHECKING:
-    from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.scene import Scene
 
 VARIABLE = "MSFP_GEN_MEMORY"  # environment variable: memory that this process may use [GB]
 COPIES = 4  # of all rows at the end of a run, at most: in C, as arrays, joined over segments, and for a file

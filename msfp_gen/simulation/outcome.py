@@ -6,31 +6,27 @@ import platform
 from collections.abc import Callable, Sequence
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msfp_gen.common.version import __version__
-from msfp_gen.results.extremes import Extremes
+from msfp_gen.model.compiled import Run
+from msfp_gen.model.model import Model
 from msfp_gen.results.geometry import contact_offsets
+from msfp_gen.results.history import Event, Extremes, History
 from msfp_gen.results.note import Note, monitor_notes
 from msfp_gen.results.sliding import intervals, sliding_surfaces
 from msfp_gen.scene.effect_selection import rigid_mass_limit, scene_doubts
 from msfp_gen.scene.effect_switching import JAM_STATUSES
 from msfp_gen.scene.fidelity import UNSEEN
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import MARGIN, standing_of
 from msfp_gen.scene.top import MassTop, RigTop
+from msfp_gen.simulation.rows import Segment
 from msfp_gen.specification.contract import STATUSES
 from msfp_gen.specification.friction_laws import is_plastic
-
-if TYPE_CHECKING:
-    from msfp_gen.model.compiled import Run
-    from msfp_gen.model.model import Model
-    from msfp_gen.results.history import Event, History
-    from msfp_gen.scene.scene import Scene
-    from msfp_gen.scene.solver import Solver
-    from msfp_gen.simulation.rows import Segment
-    from msfp_gen.specification.layout import Effects
+from msfp_gen.specification.layout import Effects
 
 Progress = Callable[[float, float], None]  # called with the time reached and the end of the run [s]
 

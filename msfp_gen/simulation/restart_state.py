@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.model.compiled import separations_at_rest
+from msfp_gen.model.compiled import Port, Run, separations_at_rest
+from msfp_gen.model.model import Model
 from msfp_gen.model.plane import out_of_plane, rotated_pairs, tilts_out_of_plane
 from msfp_gen.results.geometry import rim_forces
+from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.standing import seat_stiffness
-from msfp_gen.scene.top import sprung_mass
-
-if TYPE_CHECKING:
-    from msfp_gen.model.compiled import Port, Run
-    from msfp_gen.model.model import Model
-    from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.scene.top import Top
-    from msfp_gen.specification.friction_laws import Law
+from msfp_gen.scene.top import Top, sprung_mass
+from msfp_gen.specification.friction_laws import Law
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,30 +15,27 @@ from functools import reduce
 from hashlib import file_digest
 from operator import or_
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import replacing
+from msfp_gen.model.compiled import Run
+from msfp_gen.model.model import Model
 from msfp_gen.model.plane import out_of_plane
 from msfp_gen.results.dataset import ROWS, rows_of, to_dataset
-from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import DIGEST, digest_of_dataset
-from msfp_gen.results.history import Event, History
+from msfp_gen.results.history import Event, Extremes, History
 from msfp_gen.results.joining import BLOCK, Joint, blocks, concatenated, taken, thinned
+from msfp_gen.results.result import Result
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.stored_group import ArrayDigest, seal
 from msfp_gen.scene.effect_switching import Ending
 from msfp_gen.scene.friction_parameters import law_parameters
+from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import is_sprung
 from msfp_gen.specification.contract import EVENT_KINDS, WORKS, names
-
-if TYPE_CHECKING:
-    from msfp_gen.model.compiled import Run
-    from msfp_gen.model.model import Model
-    from msfp_gen.results.result import Result
-    from msfp_gen.scene.scene import Scene
 
 _EVENT_KINDS = names(EVENT_KINDS)
 

@@ -11,20 +11,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 from msfp_gen.buildings.dataset import scene_text
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output
-from msfp_gen.model.model import build_model
+from msfp_gen.model.compiled import Run
+from msfp_gen.model.model import Model, build_model
 from msfp_gen.results.history import Counters, History
 from msfp_gen.results.joining import joined, thinned_history
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_switching import check, next_effects, stopping_monitors
 from msfp_gen.scene.file.loader import dumps
+from msfp_gen.scene.parameters import Parameter
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import is_sprung
 from msfp_gen.simulation.building_run import BuildingRun
@@ -78,13 +81,7 @@ from msfp_gen.simulation.start import (
     start_slopes,
     state_at_rest,
 )
-
-if TYPE_CHECKING:
-    from msfp_gen.buildings.result import BuildingResult
-    from msfp_gen.model.compiled import Run
-    from msfp_gen.model.model import Model
-    from msfp_gen.scene.parameters import Parameter
-    from msfp_gen.specification.layout import Effects
+from msfp_gen.specification.layout import Effects
 
 # Of the compiled runs of a bearing, and of a building, without the GIL; Ctrl-C, progress and checkpoints are handled in
 # between.

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
-from msfp_gen.model.compiled import separations_at_rest
+from msfp_gen.model.compiled import Run, separations_at_rest
+from msfp_gen.model.model import Model
 from msfp_gen.model.plane import (
     motion_in_plane,
     out_of_plane,
@@ -26,23 +27,19 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.motions.time_grid import TimeGrid, snapped
+from msfp_gen.results.gradient import Gradients
+from msfp_gen.results.history import History
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import monitor_options
+from msfp_gen.scene.parameters import Parameter
 from msfp_gen.scene.planarity import scene_plane
+from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import load_values
 from msfp_gen.simulation.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.specification.friction_laws import SPIN
 from msfp_gen.specification.layout import Auto
-
-if TYPE_CHECKING:
-    from msfp_gen.model.compiled import Run
-    from msfp_gen.model.model import Model
-    from msfp_gen.results.gradient import Gradients
-    from msfp_gen.results.history import History
-    from msfp_gen.scene.parameters import Parameter
-    from msfp_gen.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from msfp_gen import Auto, BaseSlab, Bearing, Building, Effects, Motion, Solver, Storey, Top, presets, simulate
+from msfp_gen.buildings.extremes import CONTACT, OF_SURFACES, BuildingExtremes
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
 
@@ -73,3 +74,41 @@ def pushed_scene() -> BuildingScene:
 def pushed() -> BuildingResult:
     """The run of that scene."""
     return simulate(pushed_scene())
+
+
+def largest(vectors: np.ndarray) -> np.ndarray:
+    """Largest along time by axis and in the horizontal plane: (..., T, 3) to shape (..., 4)."""
+    radial = np.hypot(vectors[..., 0], vectors[..., 1]).max(axis=-1)
+    return np.concatenate([np.abs(vectors).max(axis=-2), radial[..., None]], axis=-1)
+
+
+def extremes_of_rows(result: BuildingResult) -> BuildingExtremes:
+    """Extremes of the rows alone, by the properties of the result; of contacts the rows know nothing."""
+    scene = result.scene
+    names = [node.name for node in scene.building.nodes]
+    nodes = np.reshape([result.node(name) for name in names], (len(names), len(result.time), 3, 6))
+    across = -np.moveaxis(result.bearing_displacement, 1, 0)
+    normal = np.nan_to_num(result.normal_force)
+    most = {name: np.nan_to_num(getattr(result, name)).max(axis=0) for name in OF_SURFACES}
+    force, axial = np.moveaxis(result.wrench[:, :, 1, :3], 1, 0), result.axial_force
+    base = scene.bearings[0].node
+    return BuildingExtremes(
+        node_acceleration=largest(nodes[:, :, 2, :3]),
+        node_displacement=largest(nodes[:, :, 0, :3] - result.ground[:, 0]),
+        drift=largest(np.moveaxis(result.drift[..., :3], 1, 0)),
+        corner_drift=largest(np.moveaxis(result.corner_drift, 0, -2)).max(axis=1, initial=0.0),
+        storey_shear=largest(np.moveaxis(result.storey_force[..., :3], 1, 0)),
+        storey_torsion=np.abs(result.storey_force[..., 5]).max(axis=0),
+        base_twist=np.abs(result.node(base)[:, 0, 5]).max(keepdims=True),
+        mean_displacement=largest(across.mean(axis=0)),
+        overturning_moment=largest(np.pad(result.overturning_moment, ((0, 0), (0, 1)))),
+        base_reaction=largest(result.base_reaction),
+        base_torsion=np.abs(result.base_torsion).max(keepdims=True),
+        energy=np.array([result.kinetic.max(), result.strain.max()]),
+        bearing_displacement=largest(across),
+        top_force=largest(force),
+        axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
+        **most,
+        **dict.fromkeys(CONTACT, np.zeros_like(most["lift"])),
+        normal_force=np.stack([normal.min(axis=0), normal.max(axis=0)], axis=1),
+    )

@@ -10,7 +10,7 @@ import pytest
 from support import preset_run, scene_of
 
 from msfp_gen import Motion, Result, simulate
-from msfp_gen.results.extremes import Extremes
+from msfp_gen.results.history import Extremes
 
 PEAKS = ("peak_displacement", "peak_force", "peak_sliding", "minimum_gap", "minimum_normal_force")
 

@@ -27,7 +27,7 @@ from msfp_gen import (
     simulate_batch,
 )
 from msfp_gen.model.model import build_model
-from msfp_gen.results.extremes import Extremes
+from msfp_gen.results.history import Extremes
 from msfp_gen.scene.parameters import parameters_of
 from msfp_gen.simulation.gradients import measured_errors, start_gradients, with_gradient_errors
 from msfp_gen.simulation.simulate import RunSequence
