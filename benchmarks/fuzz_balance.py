@@ -41,7 +41,7 @@ def verified(scene: Scene, given: Result) -> dict[str, Any]:
     scene = replace(turned(scene), output_step=None)
     sequence = RunSequence.of(scene)
     while sequence.effects is not None:
-        sequence.run_segment(None)
+        sequence.run_segment()
     whole = sequence.result()
     left = worst_row(scene, sequence, whole.history) if whole.succeeded else 0.0
     found: dict[str, Any] = {"unbalanced": left, "wrong": []}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BytesIO
 from os import PathLike
@@ -108,9 +108,9 @@ class Building:
         require_type(base, BaseSlab, "base")
         for index, storey in enumerate(storeys):
             require_type(storey, Storey, f"storeys[{index}]")
-        building = frame(base, storeys)
-        damping = _damping(building.mass, building.stiffness, building.nodes, damping_ratio, rayleigh_frequencies)
-        return cls(building.mass, damping, building.stiffness, building.nodes, building.columns)._checked()
+        mass, stiffness, nodes, columns = frame(base, storeys)
+        undamped = cls(mass, np.zeros_like(mass), stiffness, nodes, columns)
+        return undamped._damped(damping_ratio, rayleigh_frequencies)
 
     @classmethod
     def from_matrices(
@@ -131,26 +131,55 @@ class Building:
         InputError.
         """
         m, k = matrix_of(mass, "mass"), matrix_of(stiffness, "stiffness")
-        c = None if damping is None else matrix_of(damping, "damping")
+        c = np.zeros_like(m) if damping is None else matrix_of(damping, "damping")
         for name, matrix in (("damping", c), ("stiffness", k)):
-            if matrix is not None and len(matrix) != len(m):
+            if len(matrix) != len(m):
                 raise InputError(f"building.{name} has {len(matrix)} rows: building.mass has {len(m)}; give as many")
         for name, matrix in (("mass", m), ("stiffness", k)):
             check_semidefinite(matrix, name)
         points = tuple(_node(name, *place, len(m)) for name, place in nodes.items())
-        if c is None:
-            c = _damping(m, k, points, damping_ratio, rayleigh_frequencies)
-        return cls(m, c, k, points)._checked()
+        building = cls(m, c, k, points)
+        return building._damped(damping_ratio, rayleigh_frequencies) if damping is None else building._checked()
 
     @cached_property
     def boundary(self) -> tuple[int, ...]:
-        """Coordinates of the nodes that carry bearings."""
-        return boundary_of(self.nodes)
+        """Coordinates of the nodes that carry bearings. Raises InputError where two share one."""
+        boundary: list[int] = []
+        for node in self.nodes:
+            if node.carries:
+                own = np.flatnonzero(np.any(node.rows, axis=0)).tolist()
+                if shared := set(own) & set(boundary):
+                    raise InputError(f"building.nodes[{node.name!r}]: coordinate {min(shared)} is that of another node")
+                if len(own) != FREEDOMS or np.linalg.matrix_rank(node.rows[:, own]) < FREEDOMS:
+                    raise InputError(f"building.nodes[{node.name!r}] depends on {own}: give six different coordinates")
+                boundary += own
+        if not boundary:
+            raise InputError("building.nodes: none carries bearings; give at least one with its six coordinates")
+        return tuple(sorted(boundary))
 
     @cached_property
     def fixed(self) -> FixedBase:
-        """The building with these coordinates held: frequencies [rad/s] and modes."""
-        return fixed_base(self.mass, self.stiffness, self.boundary)
+        """The building with these coordinates held. Raises InputError where they do not hold it."""
+        from scipy.linalg import eigh
+
+        held = np.asarray(self.boundary, dtype=int)
+        inner = np.setdiff1d(np.arange(len(self.mass)), held)
+        if not inner.size:
+            return FixedBase(held, inner, np.zeros((0, held.size)), np.zeros(0), np.zeros((0, 0)))
+        k, m = self.stiffness[np.ix_(inner, inner)], self.mass[np.ix_(inner, inner)]
+        lowest = float(np.linalg.eigvalsh(k)[0])
+        if lowest <= 1e-14 * float(np.abs(k).max()):
+            raise InputError(
+                f"building.stiffness: on fixed attachments its least eigenvalue is {lowest:.3g}, so that parts move "
+                "without force; connect or remove them"
+            )
+        # Of M x = K x / w^2: coordinates without mass are eigenvectors of zero, and K has an inverse.
+        squares, vectors = eigh(m, k)
+        real = squares > 1e-14 * max(float(squares[-1]), 0.0)
+        order = np.flatnonzero(real)[::-1]
+        modes = vectors[:, order] / np.sqrt(squares[order])
+        follow = -np.linalg.solve(k, self.stiffness[np.ix_(inner, held)])
+        return FixedBase(held, inner, follow, 1 / np.sqrt(squares[order]), modes)
 
     @property
     def frequencies(self) -> Array:
@@ -160,7 +189,13 @@ class Building:
     @cached_property
     def rigid_motions(self) -> Array:
         """Coordinates of the six rigid motions of the whole about the origin: ndarray, shape (n, 6), [SI]."""
-        return rigid_motions(self.nodes, self._static(self.fixed), self.boundary)
+        motions = np.zeros((len(self.mass), FREEDOMS))
+        for node in self.nodes:
+            if node.carries:
+                own = np.flatnonzero(np.any(node.rows, axis=0))
+                motions[own] = np.linalg.solve(node.rows[:, own], rigid(node.position))
+        moved: Array = self._static @ motions[list(self.boundary)]
+        return moved
 
     def uniform_acceleration(self, acceleration: ArrayLike) -> Array:
         """Forces on the coordinates under which the building accelerates as one, shape (n,); acceleration [m/s^2].
@@ -190,20 +225,56 @@ class Building:
         kept = fixed.frequencies <= 2 * np.pi * frequency
         modes = np.zeros((len(self.mass), int(kept.sum())))
         modes[fixed.inner] = fixed.modes[:, kept]
-        basis = np.hstack([self._static(fixed), modes])
+        basis = np.hstack([self._static, modes])
         nodes = tuple(Node(node.name, node.position, node.rows @ basis, node.carries) for node in self.nodes)
         columns = tuple(Columns(one.name, one.deformation @ basis, one.inertia @ basis) for one in self.columns)
         mass, damping, stiffness = (_congruent(matrix, basis) for matrix in (self.mass, self.damping, self.stiffness))
         return Building(mass, damping, stiffness, nodes, columns)
 
+    def _damped(self, ratio: float | Sequence[float], frequencies: tuple[float, float] | None) -> Building:
+        """With the damping of its modes on fixed attachments, or of Rayleigh: C = a M + b K, see `shear`.
+
+        M is that of the motion relative to the attachments.
+        """
+        ratios = np.atleast_1d(np.asarray(ratio, dtype=float))
+        if ratios.ndim != 1 or not ratios.size or not np.all((ratios >= 0) & (ratios < 1)):
+            raise InputError(f"building.damping_ratio = {ratio!r}: give a number, or a list, from 0 to below 1")
+        fixed, rows = self.fixed, self.fixed.relative
+        mass = self.mass[np.ix_(fixed.inner, fixed.inner)]
+        if frequencies is None:
+            count = len(fixed.frequencies)
+            of_modes = np.pad(ratios, (0, max(count - len(ratios), 0)), "edge")[:count]
+            modal = fixed.modes.T @ mass @ rows
+            return replace(self, damping=modal.T * (2 * of_modes * fixed.frequencies) @ modal)._checked()
+        pair = np.asarray(frequencies, dtype=float)
+        if pair.shape != (2,) or not 0 < pair[0] < pair[1] < _HIGHEST or len(ratios) > 1:
+            raise InputError(
+                f"building.rayleigh_frequencies = {frequencies!r}: give two rising frequencies [Hz] and one "
+                "damping_ratio"
+            )
+        low, high = 2 * np.pi * pair
+        a, b = 2 * ratios[0] * low * high / (low + high), 2 * ratios[0] / (low + high)
+        return replace(self, damping=a * rows.T @ mass @ rows + b * self.stiffness)._checked()
+
     def _checked(self) -> Building:
+        """The building, unless stiffness or damping resist a rigid motion, which only bearings may do: InputError."""
         check_semidefinite(self.damping, "damping")
-        for name in ("stiffness", "damping"):
-            check_free(getattr(self, name), name, self.rigid_motions)
+        remedies = {
+            "stiffness": "leave out its supports, which the bearings are, and give the positions of the nodes",
+            "damping": "leave it out and give damping_ratio, or give one relative to the attachments",
+        }
+        for name, remedy in remedies.items():
+            matrix = getattr(self, name)
+            forces, scale = np.abs(matrix @ self.rigid_motions), np.abs(matrix) @ np.abs(self.rigid_motions)
+            for index, motion in enumerate(MOTIONS):
+                if forces[:, index].max(initial=0.0) > STRAIN * max(float(scale[:, index].max(initial=0.0)), 1e-300):
+                    raise InputError(f"building.{name} resists a {motion} of the whole building; {remedy}")
         return self
 
-    def _static(self, fixed: FixedBase) -> Array:
+    @property
+    def _static(self) -> Array:
         """All coordinates from those of the attachments, shape (n, boundary)."""
+        fixed = self.fixed
         rows = np.zeros((len(self.mass), len(fixed.boundary)))
         rows[fixed.boundary] = np.eye(len(fixed.boundary))
         rows[fixed.inner] = fixed.follow
@@ -228,27 +299,6 @@ def _node(name: str, indices: Sequence[int], position: ArrayLike, count: int) ->
     return Node(name, place, np.eye(count)[own], carries=True)
 
 
-def _damping(
-    mass: Array,
-    stiffness: Array,
-    nodes: tuple[Node, ...],
-    ratio: float | Sequence[float],
-    frequencies: tuple[float, float] | None,
-) -> Array:
-    ratios = np.atleast_1d(np.asarray(ratio, dtype=float))
-    if ratios.ndim != 1 or not ratios.size or not np.all((ratios >= 0) & (ratios < 1)):
-        raise InputError(f"building.damping_ratio = {ratio!r}: give a number, or a list, from 0 to below 1")
-    fixed = fixed_base(mass, stiffness, boundary_of(nodes))
-    if frequencies is None:
-        return modal_damping(mass, fixed, ratios)
-    pair = np.asarray(frequencies, dtype=float)
-    if pair.shape != (2,) or not 0 < pair[0] < pair[1] < _HIGHEST or len(ratios) > 1:
-        raise InputError(
-            f"building.rayleigh_frequencies = {frequencies!r}: give two rising frequencies [Hz] and one damping_ratio"
-        )
-    return rayleigh_damping(mass, stiffness, fixed, float(ratios[0]), (float(pair[0]), float(pair[1])))
-
-
 class FixedBase(NamedTuple):
     """A structure with its boundary coordinates held.
 
@@ -269,57 +319,6 @@ class FixedBase(NamedTuple):
         rows[:, self.inner] = np.eye(len(self.inner))
         rows[:, self.boundary] = -self.follow
         return rows
-
-
-def fixed_base(mass: Array, stiffness: Array, boundary: Sequence[int]) -> FixedBase:
-    """Modes on fixed boundary coordinates. Raises InputError where the structure is not held by them."""
-    from scipy.linalg import eigh
-
-    held = np.asarray(boundary, dtype=int)
-    inner = np.setdiff1d(np.arange(len(mass)), held)
-    if not inner.size:
-        return FixedBase(held, inner, np.zeros((0, held.size)), np.zeros(0), np.zeros((0, 0)))
-    k, m = stiffness[np.ix_(inner, inner)], mass[np.ix_(inner, inner)]
-    lowest = float(np.linalg.eigvalsh(k)[0])
-    if lowest <= 1e-14 * float(np.abs(k).max()):
-        raise InputError(
-            f"building.stiffness: on fixed attachments its least eigenvalue is {lowest:.3g}, so that parts move "
-            "without force; connect or remove them"
-        )
-    # Of M x = K x / w^2: coordinates without mass are eigenvectors of zero, and K has an inverse.
-    squares, vectors = eigh(m, k)
-    real = squares > 1e-14 * max(float(squares[-1]), 0.0)
-    order = np.flatnonzero(real)[::-1]
-    modes = vectors[:, order] / np.sqrt(squares[order])
-    follow = -np.linalg.solve(k, stiffness[np.ix_(inner, held)])
-    return FixedBase(held, inner, follow, 1 / np.sqrt(squares[order]), modes)
-
-
-def modal_damping(mass: Array, fixed: FixedBase, ratios: Array) -> Array:
-    """C of damping ratios of the modes on fixed attachments, ndarray, shape (n, n) [N s/m], [N m s].
-
-    ratios: from the lowest mode, shape (k,); the last is that of all higher ones.
-    """
-    count = len(fixed.frequencies)
-    of_modes = np.concatenate([ratios, np.full(max(count - len(ratios), 0), ratios[-1])])[:count]
-    inner = np.ix_(fixed.inner, fixed.inner)
-    rows = fixed.modes.T @ mass[inner] @ fixed.relative
-    damping: Array = rows.T * (2 * of_modes * fixed.frequencies) @ rows
-    return damping
-
-
-def rayleigh_damping(
-    mass: Array, stiffness: Array, fixed: FixedBase, ratio: float, frequencies: tuple[float, float]
-) -> Array:
-    """C = a M + b K, ndarray, shape (n, n) [N s/m], [N m s], of a damping ratio at two frequencies [Hz].
-
-    M is that of the motion relative to the attachments.
-    """
-    low, high = (2 * np.pi * frequency for frequency in frequencies)
-    a, b = 2 * ratio * low * high / (low + high), 2 * ratio / (low + high)
-    rows = fixed.relative
-    damping: Array = a * rows.T @ mass[np.ix_(fixed.inner, fixed.inner)] @ rows + b * stiffness
-    return damping
 
 
 MOST = 5000  # coordinates of a building, whose matrices are dense
@@ -380,46 +379,3 @@ def check_semidefinite(matrix: Array, name: str) -> None:
     values = np.linalg.eigvalsh(matrix)
     if values[0] < -1e-9 * max(abs(values[0]), abs(values[-1])):
         raise InputError(f"building.{name} has the eigenvalue {values[0]:.3g}: give a matrix without negative ones")
-
-
-def boundary_of(nodes: tuple[Node, ...]) -> tuple[int, ...]:
-    """Coordinates on which the nodes that carry bearings depend. Raises InputError where two share one."""
-    boundary: list[int] = []
-    for node in nodes:
-        if node.carries:
-            own = np.flatnonzero(np.any(node.rows, axis=0)).tolist()
-            if shared := set(own) & set(boundary):
-                raise InputError(f"building.nodes[{node.name!r}]: coordinate {min(shared)} is that of another node")
-            if len(own) != FREEDOMS or np.linalg.matrix_rank(node.rows[:, own]) < FREEDOMS:
-                raise InputError(f"building.nodes[{node.name!r}] depends on {own}: give six different coordinates")
-            boundary += own
-    if not boundary:
-        raise InputError("building.nodes: none carries bearings; give at least one with its six coordinates")
-    return tuple(sorted(boundary))
-
-
-def rigid_motions(nodes: tuple[Node, ...], follow: Array, boundary: tuple[int, ...]) -> Array:
-    """Coordinates of the six rigid motions of the building, shape (n, 6), [SI].
-
-    follow: static response of all coordinates to those of the boundary, shape (n, boundary).
-    """
-    motions = np.zeros((len(follow), FREEDOMS))
-    for node in nodes:
-        if node.carries:
-            own = np.flatnonzero(np.any(node.rows, axis=0))
-            motions[own] = np.linalg.solve(node.rows[:, own], rigid(node.position))
-    moved: Array = follow @ motions[list(boundary)]
-    return moved
-
-
-def check_free(matrix: Array, name: str, motions: Array) -> None:
-    """Raise InputError where stiffness or damping resist a rigid motion of the building, which only bearings may do."""
-    forces = np.abs(matrix @ motions)
-    scale = np.abs(matrix) @ np.abs(motions)
-    for index, motion in enumerate(MOTIONS):
-        if forces[:, index].max(initial=0.0) > STRAIN * max(float(scale[:, index].max(initial=0.0)), 1e-300):
-            remedy = {
-                "stiffness": "leave out its supports, which the bearings are, and give the positions of the nodes",
-                "damping": "leave it out and give damping_ratio, or give one relative to the attachments",
-            }[name]
-            raise InputError(f"building.{name} resists a {motion} of the whole building; {remedy}")

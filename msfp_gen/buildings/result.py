@@ -266,15 +266,19 @@ def _squares(rows: Array, matrix: Array) -> Array:
 class BearingResult(OneBearing):
     """One bearing of a building; names and signs are those of the `Result` of one bearing.
 
-    building: the whole result, with scene, status, message and provenance. index: of the bearing, from 0. history: its
-    rows, with base_displacement of the ground below it, and displacement across it and its interface; top_moment is
-    about its upper end.
+    building: the whole result, of which scene, status, message and provenance are. index: of the bearing, from 0.
+    history: its rows, with base_displacement of the ground below it, and displacement across it and its interface;
+    top_moment is about its upper end.
     """
 
     source: ClassVar[str] = "msfp-gen bearing"
     building: BuildingResult
     index: int
     history: BearingRows
+    scene: BuildingScene
+    status: str
+    message: str
+    provenance: dict[str, str]
 
     @classmethod
     def of(cls, building: BuildingResult, index: int) -> BearingResult:
@@ -295,27 +299,7 @@ class BearingResult(OneBearing):
             energy={name: getattr(building, name)[:, index] for name in ENERGY_BELOW},
             **rows,
         )
-        return cls(building, index, history)
-
-    @property
-    def scene(self) -> BuildingScene:
-        """That of the building."""
-        return self.building.scene
-
-    @property
-    def status(self) -> str:
-        """That of the building."""
-        return self.building.status
-
-    @property
-    def message(self) -> str:
-        """That of the building."""
-        return self.building.message
-
-    @property
-    def provenance(self) -> dict[str, str]:
-        """That of the building."""
-        return self.building.provenance
+        return cls(building, index, history, scene, building.status, building.message, building.provenance)
 
     @property
     def bearing(self) -> Bearing:

@@ -128,17 +128,11 @@ class Columns(NamedTuple):
     inertia: Array
 
 
-class Frame(NamedTuple):
-    """Matrices of an undamped frame, shape (n, n) [SI], its floors from the base upwards, and its columns."""
+def frame(base: BaseSlab, storeys: Sequence[Storey]) -> tuple[Array, Array, tuple[Node, ...], tuple[Columns, ...]]:
+    """Mass and stiffness of an undamped frame, shape (n, n) [SI], its floors from the base upwards, and its columns.
 
-    mass: Array
-    stiffness: Array
-    nodes: tuple[Node, ...]
-    columns: tuple[Columns, ...]
-
-
-def frame(base: BaseSlab, storeys: Sequence[Storey]) -> Frame:
-    """The frame of a base and storeys. Its coordinates are those of the floors at the origin of the plan."""
+    Its coordinates are those of the floors at the origin of the plan.
+    """
     nodes = _floors(storeys)
     floors: list[BaseSlab | Storey] = [base, *storeys]
     inertias = [_inertia(node, floor) for node, floor in zip(nodes, floors, strict=True)]
@@ -147,7 +141,7 @@ def frame(base: BaseSlab, storeys: Sequence[Storey]) -> Frame:
     stiffness = np.zeros_like(mass)
     for storey, column in zip(storeys, columns, strict=True):
         stiffness += column.deformation.T * storey.springs @ column.deformation
-    return Frame(mass, stiffness, nodes, columns)
+    return mass, stiffness, nodes, columns
 
 
 def _inertia(node: Node, floor: BaseSlab | Storey) -> Array:

@@ -257,9 +257,10 @@ def explore(
     """Write one HTML file in which sliders change a bearing and its motion, and the response is computed at once."""
     from msfp_gen.buildings.file import load_bearing_scene
     from msfp_gen.common.output import check_output
-    from msfp_gen.report.explore import SUFFIXES, write_explorer
+    from msfp_gen.report import REPORT_SUFFIXES
+    from msfp_gen.report.explore import write_explorer
 
-    path = check_output(output, SUFFIXES, "--output")
+    path = check_output(output, REPORT_SUFFIXES, "--output")
     first = None if scene is None else load_bearing_scene(scene)
     with Progress("explorer") as progress:
         write_explorer(path, first, progress)

@@ -27,8 +27,8 @@ from msfp_gen.figures.building import (
     plot_plan,
     plot_profile,
 )
+from msfp_gen.figures.charts import plot_correction, plot_response_spectrum, plot_work_precision
 from msfp_gen.figures.movie import MOVIE_SUFFIXES, animate, check_movie
-from msfp_gen.figures.records import plot_correction, plot_response_spectrum
 from msfp_gen.figures.section import plot_section
 from msfp_gen.figures.style import (
     COLOURS,
@@ -43,7 +43,6 @@ from msfp_gen.figures.style import (
     page,
     panels,
 )
-from msfp_gen.figures.work_precision import plot_work_precision
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.sign import using_sign
 

@@ -36,7 +36,7 @@ from msfp_gen.figures.style import (
     strips,
     subscript,
 )
-from msfp_gen.results.geometry import friction_circles, poses, sections, slider_radius
+from msfp_gen.results.geometry import contact_offsets, friction_circles, sections, slider_radius
 from msfp_gen.results.joining import at_times
 from msfp_gen.results.run_data import BearingData, RunData
 from msfp_gen.results.sign import shown_sign
@@ -355,12 +355,8 @@ def plot_force_path(result: RunData, path: str | Path | None = None, *, time: fl
 
 def eccentricity(result: RunData) -> Array:
     """Distance of every contact from the axis of its slider [m], shape (T, n-1); NaN while the surface is separated."""
-    where, bearing = poses(result), result.scene.bearing
-    sliders = [bearing.slider(surface) for surface in range(bearing.layout.surfaces)]
-    axes = where.basis[:, sliders, 2]
-    arm = where.contact - where.centre
-    off: Array = np.linalg.norm(arm - np.sum(arm * axes, axis=-1, keepdims=True) * axes, axis=-1)
-    return np.where(result.history.separated, np.nan, off)
+    history = result.history
+    return np.where(history.separated, np.nan, contact_offsets(result.scene.bearing, history))
 
 
 def _draw_offsets(figure: SubFigure, result: RunData) -> None:

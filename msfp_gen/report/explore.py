@@ -8,7 +8,6 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace
@@ -18,14 +17,11 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import CompileError, InputError
-from msfp_gen.common.output import check_output, write_bytes
-from msfp_gen.common.version import __version__
 from msfp_gen.figures.style import COLOURS
 from msfp_gen.jit.build import BuildInfo, runtime_sources
 from msfp_gen.jit.compiler import FLAGS, Log, Step, zig_program
 from msfp_gen.model.model import Model
-from msfp_gen.report.content import script_data
-from msfp_gen.report.frames import pieces
+from msfp_gen.report.frames import asset, pieces, render, script_data, write_page
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import RigTop
 from msfp_gen.simulation.start import start_run
@@ -176,16 +172,15 @@ def _packed(values: Any) -> str:
 
 
 Progress = Callable[[float, float], None]
-SUFFIXES = (".html", ".htm")
 # Presets of a page without a scene of the user's: laboratory tests, orbits, other devices, and a bundled record.
 EXPLORED = (
     "fenz-test2", "fenz-test5", "becker-circle-88", "becker-eight-88", "unusual-tfp", "double-push", "quintuple-push",
     "ridgecrest-clc",
 )  # fmt: skip
 RECORD = 15.0  # of a record [s]: the strong part of the bundled one
-SHARED = ("dom.js", "chart.js")  # scripts of the HTML report
-WORKER = ("solver.js", "worker.js")
-SCRIPTS = ("numbers.js", "stack.js", "explorer.js")
+WORKER = ("explorer/solver.js", "explorer/worker.js")
+# The first two are those of the HTML report.
+SCRIPTS = ("dom.js", "chart.js", "explorer/numbers.js", "explorer/stack.js", "explorer/explorer.js")
 
 
 def write_explorer(path: str | Path, scene: Scene | None = None, progress: Progress | None = None) -> Path:
@@ -193,9 +188,7 @@ def write_explorer(path: str | Path, scene: Scene | None = None, progress: Progr
 
     Raises InputError for a path that does not end in .html or cannot be written.
     """
-    path = check_output(path, SUFFIXES)
-    write_bytes(path, [explorer_html(scene, progress).encode()])
-    return path
+    return write_page(path, lambda: explorer_html(scene, progress))
 
 
 def explorer_html(scene: Scene | None = None, progress: Progress | None = None) -> str:
@@ -209,7 +202,6 @@ def explorer_html(scene: Scene | None = None, progress: Progress | None = None) 
         InputError: the page cannot run the scene.
         CompileError: ziglang is missing, or it rejected a file.
     """
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     problems = _problems(scene)
@@ -223,17 +215,11 @@ def explorer_html(scene: Scene | None = None, progress: Progress | None = None) 
         "modules": modules,
         "problems": [{**problem.data, "module": specs.index(problem.spec)} for problem in problems],
     }
-    report = files(__package__).joinpath("assets")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
-    return environment.from_string(_asset("explorer.html.jinja")).render(
-        version=__version__,
-        style=Markup(report.joinpath("page.css").read_text(encoding="utf-8")),
+    return render(
+        "explorer/explorer.html.jinja",
         data=script_data(data),
-        worker=Markup("".join(_asset(name) for name in WORKER)),
-        scripts=[
-            *(Markup(report.joinpath(name).read_text(encoding="utf-8")) for name in SHARED),
-            *(Markup(_asset(name)) for name in SCRIPTS),
-        ],
+        worker=Markup("".join(map(asset, WORKER))),
+        scripts=[Markup(asset(name)) for name in SCRIPTS],
     )
 
 
@@ -265,10 +251,6 @@ def _problems(scene: Scene | None) -> Sequence[Problem]:
     return [first, *(problem for problem in named if problem.spec == first.spec and problem.scene.name != scene.name)]
 
 
-def _asset(name: str) -> str:
-    return files(__package__).joinpath("assets/explorer", name).read_text(encoding="utf-8")
-
-
 GLUE = "explorer.c"
 OUTPUT = "model.wasm"
 # A library without a main function; of the processor only the vectors that every browser has.
@@ -285,8 +267,7 @@ def wasm_module(spec: ModelSpec) -> bytes:
     if zig is None:
         raise CompileError("the explorer needs ziglang, a compiler for WebAssembly: pip install 'msfp-gen[compiler]'")
     generated = {name: text for name, text in generate(spec).files.items() if name.endswith((".c", ".h"))}
-    glue = {GLUE: files(__package__).joinpath("assets/explorer", GLUE).read_text(encoding="utf-8")}
-    sources = {**runtime_sources(), **generated, **glue}
+    sources = {**runtime_sources(), **generated, GLUE: asset(f"explorer/{GLUE}")}
     flags = [flag for flag in FLAGS["c"] if flag not in NATIVE]
     units = sorted(name for name in sources if name.endswith(".c"))
     with TemporaryDirectory() as folder:

@@ -1,16 +1,24 @@
-"""Data of the interactive view: selected rows of a run, as arrays in JSON."""
+"""What pages are made of: templates and scripts of assets/, figures, and selected rows of a run as arrays in JSON."""
 
 from __future__ import annotations
 
 import base64
+import json
+import re
+from collections.abc import Callable
+from importlib.resources import files
+from io import BytesIO
 from itertools import pairwise
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.output import check_output, write_bytes
+from msfp_gen.common.version import __version__
 from msfp_gen.figures import COLOURS
 from msfp_gen.figures.building import DEPTH, height_of, level_of, plan_of, size_of
 from msfp_gen.results.geometry import POINTS, Poses, friction_circles, outline, poses
@@ -19,6 +27,10 @@ from msfp_gen.results.joining import at_times
 from msfp_gen.results.result import Result
 from msfp_gen.results.sliding import sliding_surfaces
 from msfp_gen.scene.bearing import Bearing
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+    from matplotlib.figure import Figure
 
 FRAMES = 1500  # instants; 0.5 kB each for a triple pendulum, and more than a screen has pixel columns
 FEWEST = 600  # least number of instants, so that the motion looks continuous
@@ -213,3 +225,47 @@ def building_rows(result: BuildingResult, count: int) -> Array:
     peaks = [int(bearing.history.horizontal.argmax()) for bearing in result.bearings]
     least = result.axial_force.argmin(axis=0).tolist()
     return np.unique([*even.round().astype(int), *peaks, *least])
+
+
+RESOLUTION = 110  # dots per inch of the figures
+
+
+def render(template: str, **values: Any) -> str:
+    """The page of a template in assets/, as text. An undefined name is an error; text is escaped."""
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True, loader=FunctionLoader(asset)
+    )
+    return environment.get_template(template).render(version=__version__, style=Markup(asset("page.css")), **values)
+
+
+def picture(title: str, figure: Figure) -> dict[str, str]:
+    """A figure as the templates show it: its title and its PNG data."""
+    data = BytesIO()
+    figure.savefig(data, format="png", dpi=RESOLUTION)
+    return {"title": title, "png": base64.b64encode(data.getvalue()).decode("ascii")}
+
+
+def asset(name: str) -> str:
+    """A file of assets/ as text."""
+    return files(__package__).joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def script_data(data: Any) -> Markup:
+    """Data as JSON inside a script element, which no text in it can end: <, > and & are escaped."""
+    from markupsafe import Markup
+
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return Markup(re.sub(r"[<>&]", lambda match: f"\\u{ord(match[0]):04x}", text))
+
+
+REPORT_SUFFIXES = (".html", ".htm")
+
+
+def write_page(path: str | Path, text: Callable[[], str]) -> Path:
+    """Write a page; the file appears only when complete. Raises InputError for a path that cannot be written."""
+    path = check_output(path, REPORT_SUFFIXES)
+    write_bytes(path, [text().encode()])
+    return path

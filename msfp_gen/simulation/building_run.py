@@ -115,22 +115,24 @@ class Member:
         return [(name, shapes[name]) for name in KEPT]
 
     @property
+    def _indices(self) -> dict[str, Any]:
+        """Indices into the row of its model, by field, each of the shape of the field."""
+        row = [(name, tuple(shape)) for name, shape in self.model.extension.ROW]
+        return parts(np.arange(sum(int(np.prod(shape, dtype=int)) for _, shape in row)), row)
+
+    @property
     def entries(self) -> Array:
         """Indices into the row of its model of the numbers that are kept, shape (kept,) [-]; -1: none, it is 0."""
-        row = [(name, tuple(shape)) for name, shape in self.model.extension.ROW]
-        size = sum(int(np.prod(shape, dtype=int)) for _, shape in row)
-        indices = parts(np.arange(size), row)
-        kept = [indices[name] if name in indices else np.full(shape, -1) for name, shape in self.shapes]
+        indices = self._indices
+        kept = [indices.get(name, np.full(shape, -1)) for name, shape in self.shapes]
         return np.concatenate([values.ravel() for values in kept])
 
     @property
     def faces(self) -> list[int]:
         """Where the contacts are in the row of its model, as MSFP_FACES of msfp_building.h; not checked with uplift."""
-        layout, row = self.rest.bearing.layout, [(name, tuple(shape)) for name, shape in self.model.extension.ROW]
-        sizes = [int(np.prod(shape, dtype=int)) for _, shape in row]
-        starts = dict(zip((name for name, _ in row), np.cumsum([0, *sizes]).tolist(), strict=False))
-        places = [starts[name] for name in ("normal", "angles", "q")]
-        return [not self.effects.uplift, layout.surfaces, layout.m, *places, dict(row)["q"][1]]
+        layout, indices = self.rest.bearing.layout, self._indices
+        places = [int(indices[name].flat[0]) for name in ("normal", "angles", "q")]
+        return [not self.effects.uplift, layout.surfaces, layout.m, *places, indices["q"].shape[1]]
 
     @property
     def work(self) -> Array:
@@ -153,7 +155,7 @@ class Member:
 
 
 BEARINGS_OF_A_THREAD = 8  # fewer are not worth a thread
-ENERGIES = ("damped", "received", "input")
+MOTIONS, ENERGIES = ("displacement", "velocity", "acceleration"), ("damped", "received", "input")
 
 
 class Run(AnyRun, Protocol):
@@ -323,7 +325,7 @@ def columns(run: BuildingRun) -> Iterator[tuple[str, tuple[int, ...]]]:
     """Parts of a row in order: names and shapes."""
     n = len(run.scene.building.mass)
     yield "time", ()
-    yield from ((name, (n,)) for name in ("displacement", "velocity", "acceleration"))
+    yield from ((name, (n,)) for name in MOTIONS)
     yield "ground", (len(run.grounds), 3, 3)
     yield from ((name, ()) for name in ENERGIES)
     for index, member in enumerate(run.members):
@@ -342,33 +344,29 @@ def unpacked(run: BuildingRun) -> dict[str, Array]:
 
 def result_of(run: BuildingRun) -> BuildingResult:
     """The rows of a run until now."""
-    rows = unpacked(run)
-    count = len(run.members)
+    rows, bearings, count = unpacked(run), run.scene.every_bearing, len(run.members)
     works = [dict(zip(names(WORKS), rows[f"work {i}"].T, strict=True)) for i in range(count)]
+
+    def of_bearings(name: str) -> list[Array]:
+        return [rows[f"{name} {i}"] for i in range(count)]
+
+    alike: dict[str, Any] = {name: rows[name] for name in ("time", *MOTIONS, *ENERGIES)}
     return BuildingResult(
+        **alike,
         scene=run.scene,
-        time=rows["time"],
-        displacement=rows["displacement"],
-        velocity=rows["velocity"],
-        acceleration=rows["acceleration"],
         ground=rows["ground"][:, 0],
-        wrench=np.stack([rows[f"wrench {i}"] for i in range(count)], axis=1),
-        normal_force=padded([rows[f"normal {i}"] for i in range(count)], np.nan),
-        sliding=padded([rows[f"sliding {i}"] for i in range(count)], np.nan),
-        rim_force=padded([rows[f"rim {i}"] for i in range(count)], np.nan),
-        lift=padded([lift_of(rows[f"compression {i}"]) for i in range(count)], np.nan),
-        temperature=padded(
-            [temperature_of(run.scene.bearings[i].bearing, rows[f"temperature {i}"]) for i in range(count)], np.nan
-        ),
+        wrench=np.stack(of_bearings("wrench"), axis=1),
+        normal_force=padded(of_bearings("normal"), np.nan),
+        sliding=padded(of_bearings("sliding"), np.nan),
+        rim_force=padded(of_bearings("rim"), np.nan),
+        lift=padded(list(map(lift_of, of_bearings("compression"))), np.nan),
+        temperature=padded(list(map(temperature_of, bearings, of_bearings("temperature"))), np.nan),
         dissipated=np.stack([sum((work[name] for name in DISSIPATED), np.zeros(1)) for work in works], axis=1),
         stored=np.stack([_stored(run, rows, i) + works[i]["friction_stored"] for i in range(count)], axis=1),
-        damped=rows["damped"],
-        received=rows["received"],
-        input=rows["input"],
         support=rows["ground"][:, run.scene.grounds[1]],
         counters=run.run.counts,
-        monitored=run.notes,
         extremes=run.extremes,
+        monitored=run.notes,
     )
 
 

@@ -14,13 +14,15 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import check_folder, clear_leftovers, write_bytes
+from msfp_gen.model.compiled import Run
 from msfp_gen.model.model import Model
 from msfp_gen.scene.scene import Scene
+from msfp_gen.simulation.building_run import BuildingRun
 from msfp_gen.simulation.rows import RowFile, rows_beside
 
 MAGIC = b"msfp-gen checkpoint 2\n"
@@ -54,26 +56,7 @@ def require_no_checkpoint(checkpoint: str | Path) -> None:
         )
 
 
-class Resumable(Protocol):
-    """The run of a bearing or of a building, which can be saved and continued."""
-
-    @property
-    def time(self) -> float:
-        """Time reached [s]."""
-
-    @property
-    def status(self) -> tuple[Any, ...]:
-        """Its name, and what is known of a failure."""
-
-    @property
-    def dropped_rows(self) -> int:
-        """Number of rows that it no longer holds."""
-
-    def snapshot(self) -> bytes:
-        """Its state, with the rows that it holds."""
-
-    def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
+Resumable = Run | BuildingRun  # of a bearing or of a building: it can be saved and continued
 
 
 @dataclass(frozen=True)

@@ -31,13 +31,6 @@ from msfp_gen.specification.layout import Effects
 Progress = Callable[[float, float], None]  # called with the time reached and the end of the run [s]
 
 
-def message_of(scene: Scene, segment: Segment) -> str:
-    """Message about a segment that failed, in one line; after a monitor stopped the run, the texts of its notes."""
-    stopped = segment.status == "monitor"
-    cause = "; ".join(note.text for note in monitor_notes(segment.ending, None)) if stopped else None
-    return message(scene, segment.model, segment.run, segment.status, cause)
-
-
 def extremes_of(segments: Sequence[Segment]) -> Extremes | None:
     """Extremes of all segments in the frame of the user; None where none of them could start.
 
@@ -74,16 +67,22 @@ AT_ONCE = 1e-3  # [s]; a failure before is one of the initial state
 OVERTURNED = 0.1  # tilt of the top plate above which the stack is considered to overturn [rad]
 
 
-def message(scene: Scene, model: Model, run: Run, status: str, cause: str | None = None) -> str:
-    """One line with time, surface, cause, remedy and last state. cause: None for the meaning of the status."""
+def message_of(scene: Scene, segment: Segment) -> str:
+    """One line about a segment that failed: time, surface, cause, remedy and last state.
+
+    The cause is the meaning of the status, or after a monitor stopped the run the texts of its notes.
+    """
+    model, run, status, cause = segment.model, segment.run, segment.status, ""
+    if status == "monitor":
+        cause = "; ".join(note.text for note in monitor_notes(segment.ending, None))
     text = stopped(run.time, scene.end, status, *run.status[1:], cause)
     text += _state(scene, model, run) if _STATUSES[status].motion and run.row_count else ""
     text += PULLED if _pulled(scene, run) else ""
     return text + (MASSLESS if _inertia_missing(scene, model, status) else "")
 
 
-def stopped(time: float, end: float, status: str, surface: int, value: float, cause: str | None = None) -> str:
-    """Time reached and end of a run [s], surface (0: none), value and cause; None: the meaning of the status."""
+def stopped(time: float, end: float, status: str, surface: int, value: float, cause: str = "") -> str:
+    """Time reached and end of a run [s], surface (0: none), value and cause; "": the meaning of the status."""
     known = _STATUSES[status]
     where = f", surface {surface}" if surface else ""
     where += f", {known.quantity} = {value:.4g}" if surface and known.quantity else ""
@@ -144,6 +143,12 @@ TEXTS = {
 }
 
 
+def _note(kind: str, time: float, value: float, surface: int = 0, **more: float) -> Note:
+    """The note of this kind. more: numbers of its text beside value and surface."""
+    text = TEXTS[kind].format(value=value, surface=surface, **more)
+    return Note(float(time), kind, surface, float(value), text)
+
+
 def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
     """The notes that follow from the rows of a whole run; `effects`: of its last segment."""
     unseen = (Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity]),) if scene.fidelity in UNSEEN else ()
@@ -165,8 +170,7 @@ def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
     elastic = [s.friction * s.yield_displacement for s in scene.bearing.surfaces]
     if lost < 10 * float(normal @ np.array(elastic)) or not damped > DAMPING_LIMIT * lost:
         return ()
-    share = damped / lost
-    return (Note(float(history.time[-1]), "damping", 0, share, TEXTS["damping"].format(value=share)),)
+    return (_note("damping", history.time[-1], damped / lost),)
 
 
 def tolerance_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
@@ -183,8 +187,7 @@ def tolerance_notes(scene: Scene, effects: Effects, history: History) -> tuple[N
     row = int(across.argmax())
     if not force > TOLERANCE_LIMIT * across[row] > 0:
         return ()
-    text = TEXTS["tolerance"].format(value=force, share=force / across[row])
-    return (Note(float(history.time[row]), "tolerance", 0, force, text),)
+    return (_note("tolerance", history.time[row], force, share=force / across[row]),)
 
 
 def peak_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
@@ -194,8 +197,7 @@ def peak_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, 
     peak = float(history.normal_force[row, surface])
     if effects.uplift or not 0 < limit < peak:
         return ()
-    text = TEXTS["peak"].format(surface=surface + 1, value=peak)
-    return (Note(float(history.time[row]), "peak", int(surface) + 1, peak, text),)
+    return (_note("peak", history.time[row], peak, int(surface) + 1),)
 
 
 def landing_notes(events: tuple[Event, ...]) -> tuple[Note, ...]:
@@ -204,8 +206,7 @@ def landing_notes(events: tuple[Event, ...]) -> tuple[Note, ...]:
     for surface in sorted({event.surface for event in events if event.kind == "landing"}):
         times = np.array([event.time for event in events if event.kind == "landing" and event.surface == surface])
         if (times[LANDINGS:] - times[:-LANDINGS] < LANDING_TIME).any():
-            text = TEXTS["rattle"].format(surface=surface, value=len(times))
-            notes.append(Note(float(times[0]), "rattle", surface, float(len(times)), text))
+            notes.append(_note("rattle", times[0], len(times), surface))
     return tuple(notes)
 
 
@@ -221,9 +222,8 @@ def footprint_notes(scene: Scene, effects: Effects, history: History) -> tuple[N
     offsets = np.where(loaded, contact_offsets(bearing, history), 0.0)
     faces = bearing.arrays()["rim_radius"][[bearing.slider(j) for j in range(history.surfaces)]]
     for j in np.flatnonzero((offsets.max(axis=0) > faces) & (faces > 0)):
-        row, surface = int(offsets[:, j].argmax()), int(j) + 1
-        text = TEXTS["footprint"].format(surface=surface, value=offsets[row, j])
-        notes.append(Note(float(history.time[row]), "footprint", surface, float(offsets[row, j]), text))
+        row = int(offsets[:, j].argmax())
+        notes.append(_note("footprint", history.time[row], offsets[row, j], int(j) + 1))
     return tuple(notes)
 
 
@@ -243,7 +243,7 @@ def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note,
     moved = sum(move for move in moves if move > elastic)
     if moved <= CREEP_SHARE * float(across.max()):
         return ()
-    return (Note(long[0][0], "creep", 0, moved, TEXTS["creep"].format(value=moved)),)
+    return (_note("creep", long[0][0], moved),)
 
 
 def energy_notes(scene: Scene, history: History) -> tuple[Note, ...]:
@@ -262,4 +262,4 @@ def energy_notes(scene: Scene, history: History) -> tuple[Note, ...]:
     error = abs(float(energy["numerical"][row])) / scale if scale else 0.0
     if not error > ENERGY_LIMIT:
         return ()
-    return (Note(float(history.time[row]), "energy", 0, error, TEXTS["energy"].format(value=error)),)
+    return (_note("energy", history.time[row], error),)

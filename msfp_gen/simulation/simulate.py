@@ -86,8 +86,6 @@ from msfp_gen.specification.layout import Effects
 # Of the compiled runs of a bearing, and of a building, without the GIL; Ctrl-C, progress and checkpoints are handled in
 # between.
 STEPS_PER_CALL, BUILDING_STEPS_PER_CALL = 4000, 20
-CheckpointOptions = tuple[Path | None, float, bool]  # file, seconds between checkpoints, whether to resume
-NO_CHECKPOINT: CheckpointOptions = (None, EVERY, False)
 
 
 @overload
@@ -213,7 +211,7 @@ def simulate(
         saved = None if checkpoint is None else segment_file(checkpoint, len(segments))
         # Later segments have no file yet where the earlier process ended in a previous one.
         resumed = resume and saved is not None and (saved.exists() or not (segments or checkpoint_files(saved)))
-        sequence.run_segment(progress, (saved, every, resumed))
+        sequence.run_segment(progress, saved, every, resumed)
     result = sequence.result()
     if not result.succeeded:
         raise RunError(result.message, status=result.status, result=result)
@@ -273,12 +271,41 @@ class RunSequence:
             start_gradients(run, scene, model, self.parameters, energies=self.energies, start=self.start)
         return run, azimuth
 
-    def run_segment(self, progress: Progress | None, options: CheckpointOptions = NO_CHECKPOINT) -> None:
-        """Run the next segment to its end, add its notes, and determine the effects of the segment after it."""
-        assert self.effects is not None
-        segment = _segment(self, progress, options)
+    def run_segment(
+        self,
+        progress: Progress | None = None,
+        saved: Path | None = None,
+        every: float = EVERY,
+        resume: bool = False,
+    ) -> None:
+        """Build the next model and run it to its end, add its notes, and determine the effects of the segment after it.
+
+        saved: file of its checkpoint. every: seconds between two of them. resume: continue from it.
+        """
+        scene, effects = self.settled, self.effects
+        assert effects is not None
+        check(scene, effects)
+        start = time.perf_counter()
+        model = build_model(scene.bearing.layout, effects, gradients=bool(self.parameters))
+        checkpoint = None if saved is None else Checkpoint(saved, Identity.of(scene, model), every, resume)
+        stored = None if self.stream is None else RowFile.of_segment(saved, self.stream.parent, model, resume)
+        run, azimuth = self.start_segment(model)
+        if checkpoint is not None:
+            checkpoint.restore(run, stored)
+        ready = time.perf_counter()
+        earlier, copies = sum(segment.run.row_count for segment in self.segments), 1 + len(self.parameters)
+
+        def step() -> bool:
+            return run.advance(STEPS_PER_CALL, 0 if stored is None else ROWS_HELD)
+
+        def is_full() -> bool:
+            return outgrown(copies * (earlier + run.row_count), scene.bearing.layout.surfaces)
+
+        status = _advance(run, step, scene.end, progress, checkpoint, stored, is_full)
+        wall = time.perf_counter() - ready + (checkpoint.wall if checkpoint is not None else 0.0)
+        segment = Segment(model, run, azimuth, status, wall, ready - start, stored)
         self.segments.append(segment)
-        following = None if self.strict else next_effects(self.settled, segment.ending)
+        following = None if self.strict else next_effects(scene, segment.ending)
         notes = monitor_notes(segment.ending, following)
         self.notes = joined_notes(self.notes, notes)
         if self.parameters and following is not None:
@@ -312,7 +339,7 @@ def state_at_start(scene: Scene, strict: bool = False) -> Result:
     """
     sequence = RunSequence.of(scene, strict)
     while sequence.effects is not None:
-        sequence.run_segment(None)
+        sequence.run_segment()
     return sequence.result(with_initial_row=True)
 
 
@@ -332,35 +359,6 @@ def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, S
         raise RunError(f"before the start, while the plates are tilted: {error}", status=error.status) from error
     state = state_at_rest(end.history.tilt_angles[-1], end.history.friction_state[-1])
     return replace(scene, initial_state=state), start_slopes(end.history, end.gradients, parameters)
-
-
-def _segment(sequence: RunSequence, progress: Progress | None, options: CheckpointOptions) -> Segment:
-    """Build the model of the next segment and run it to its end."""
-    scene, effects = sequence.settled, sequence.effects
-    assert effects is not None
-    check(scene, effects)
-    start = time.perf_counter()
-    model = build_model(scene.bearing.layout, effects, gradients=bool(sequence.parameters))
-    path, every, resume = options
-    checkpoint = None if path is None else Checkpoint(path, Identity.of(scene, model), every, resume)
-    stored = None if sequence.stream is None else RowFile.of_segment(path, sequence.stream.parent, model, resume)
-    run, azimuth = sequence.start_segment(model)
-    if checkpoint is not None:
-        checkpoint.restore(run, stored)
-    ready = time.perf_counter()
-    earlier = sum(segment.run.row_count for segment in sequence.segments)
-    copies = 1 + len(sequence.parameters)
-    surfaces = scene.bearing.layout.surfaces
-
-    def step() -> bool:
-        return run.advance(STEPS_PER_CALL, 0 if stored is None else ROWS_HELD)
-
-    def is_full() -> bool:
-        return outgrown(copies * (earlier + run.row_count), surfaces)
-
-    status = _advance(run, step, scene.end, progress, checkpoint, stored, is_full)
-    wall = time.perf_counter() - ready + (checkpoint.wall if checkpoint is not None else 0.0)
-    return Segment(model, run, azimuth, status, wall, ready - start, stored)
 
 
 def _advance(

@@ -17,7 +17,7 @@ from msfp_gen.figures.bearing import draw_bars, eccentricity
 from msfp_gen.report.frames import STATES, instants, view
 from msfp_gen.results.geometry import poses, sections
 from msfp_gen.results.joining import at_times
-from msfp_gen.results.sliding import separated, sliding_surfaces
+from msfp_gen.results.sliding import sliding_surfaces
 
 SMOOTH = 1e-3  # friction so small that the footprint of the seat is the slider's face
 
@@ -79,17 +79,17 @@ def test_section_says_how_far_a_surface_is_open_and_draws_no_force_there(tmp_pat
     labels = [line.get_label() for line in axes.get_lines()]
     assert f"surface 4 separated by {1e3 * then.history.lift[0, 3]:.2f} mm" in labels
     markers = [line for line in axes.get_lines() if line.get_marker() == "o" and line.get_visible()]
-    assert len(markers) == 4 - separated(then.history).sum()
+    assert len(markers) == 4 - then.history.separated.sum()
     assert not poses(then).force[0, 3].any()
     plot_force_path(hop(), tmp_path / "path.png")
-    assert np.isnan(eccentricity(hop())[separated(hop().history)]).all()
+    assert np.isnan(eccentricity(hop())[hop().history.separated]).all()
 
 
 def test_bars_are_white_where_a_surface_is_open():
     figure, axes = plt.subplots()
     draw_bars(axes, hop())
     assert "white: separated" in axes.get_title() + axes.get_title(loc="left")
-    assert not (sliding_surfaces(hop().history) & separated(hop().history)).any()
+    assert not (sliding_surfaces(hop().history) & hop().history.separated).any()
     plt.close(figure)
 
 
@@ -102,7 +102,7 @@ def test_report_says_separated_where_a_surface_is_open():
     seen, when = view(hop()), instants(hop())
     packed = seen["frames"]["state"]
     state = np.frombuffer(base64.b64decode(packed["data"]), "<f4").reshape(packed["shape"])
-    flags = separated(at_times(hop(), when).history)
+    flags = at_times(hop(), when).history.separated
     assert flags.any() and not flags.all()
     np.testing.assert_array_equal(state == STATES.index("separated"), flags)
 

@@ -19,9 +19,8 @@ from msfp_gen.cli import main
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.report import TitleBlock, report_html, write_report
-from msfp_gen.report.content import TERMS, provenance_table
 from msfp_gen.report.frames import instants, main_direction, packed, pieces, selected_rows, states, view
-from msfp_gen.report.page import BEARING
+from msfp_gen.report.page import BEARING, TERMS, provenance_table
 from msfp_gen.results.geometry import poses
 from msfp_gen.results.note import Note
 from msfp_gen.results.result import Result

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from msfp_gen import InitialState, InputError, changed_scene, load_scene, simulate
-from msfp_gen.buildings.fidelity import building_at_fidelity
+from msfp_gen.buildings.file import building_at_fidelity
 from msfp_gen.scene.fidelity import LOOSE, Backbone, at_fidelity, equivalent_pendulum, main_regime
 from msfp_gen.scene.file.loader import bearing_from_table
 

@@ -38,7 +38,7 @@ def ended(scene: Scene) -> tuple[RunSequence, Result]:
     """All segments of a run, and its result."""
     sequence = RunSequence.of(scene)
     while sequence.effects is not None:
-        sequence.run_segment(None)
+        sequence.run_segment()
     return sequence, sequence.result()
 
 

@@ -128,7 +128,7 @@ def test_a_row_of_a_block_is_that_of_the_whole() -> None:
     assert abs(whole.history.top_force[:, 1]).max() > 1.0
     scene = SCENES["a planar model aslant"]
     sequence = simulation.RunSequence.of(scene)
-    sequence.run_segment(None)
+    sequence.run_segment()
     (segment,) = sequence.segments
     rows = segment.run.rows
     for count in (1, 2, 3, 5):
