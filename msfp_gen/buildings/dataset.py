@@ -223,7 +223,9 @@ def to_dataset(result: Any) -> xr.Dataset:
     counters = {**result.counters, "wall_time": result.wall_time}
     about = attributes_of(result, edition(), scene_text(result.scene), result.monitored, counters)
     about |= {"motion": PIECES, "padding": "NaN: the bearing has no such surface"}
-    return dataset_of(_variables(result.scene), arrays_of(result), labelled(labels_of(result.scene)), about)
+    storeys = bool(result.scene.building.columns)
+    shown = {name: v for name, v in VARIABLES.items() if storeys or "storey" not in v.dims}
+    return dataset_of(shown, arrays_of(result), labelled(labels_of(result.scene)), about)
 
 
 def dataset_of_one(one: Any) -> xr.Dataset:
@@ -232,11 +234,6 @@ def dataset_of_one(one: Any) -> xr.Dataset:
     parts = {"bearing": bearing_table(mount.bearing), "interface": plain_table(mount.interface)}
     text = dumps({"axial_load": one.axial_load, **parts})
     return dataset_of_bearing(one, attributes_of(one, "", text, one.notes, {}) | {"bearing": one.label})
-
-
-def _variables(scene: BuildingScene) -> dict[str, Variable]:
-    """Those of storeys only where there are some."""
-    return {name: v for name, v in VARIABLES.items() if scene.building.columns or "storey" not in v.dims}
 
 
 def labels_of(scene: BuildingScene) -> Labels:

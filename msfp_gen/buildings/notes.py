@@ -39,7 +39,9 @@ def notes_of(scene: BuildingScene, monitored: Sequence[Note], error: float, time
     labelled = [replace(note, text=f"{scene.label(note.bearing - 1)}: {note.text}") for note in notes]
     whole = [Note(0.0, "value", *doubt) for doubt in building_doubts(scene)]
     whole += [Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity])] if scene.fidelity in UNSEEN else []
-    return tuple(sorted([*labelled, *whole, *_energy(error, time)], key=lambda note: note.time))
+    if error > ENERGY_LIMIT:
+        whole.append(Note(time, "energy", 0, error, ENERGY.format(value=error)))
+    return tuple(sorted([*labelled, *whole], key=lambda note: note.time))
 
 
 def _gathered(notes: Sequence[Note]) -> list[Note]:
@@ -65,11 +67,6 @@ def value_notes(one: BuildingBearing, load: float) -> tuple[Note, ...]:
     stiffness, needed, _ = standing_below(one, load)
     doubts = (*doubtful_values(one.bearing), *unsteady("interface.rotational_stiffness", stiffness, needed))
     return tuple(Note(0.0, "value", *doubt) for doubt in doubts)
-
-
-def _energy(error: float, time: float) -> Iterator[Note]:
-    if error > ENERGY_LIMIT:
-        yield Note(time, "energy", 0, error, ENERGY.format(value=error))
 
 
 LIGHT = 0.005  # mass of a floor over the mean of all floors

@@ -154,6 +154,11 @@ class BuildingScene:
         return motions, indices
 
     @property
+    def first_ground(self) -> Motion:
+        """The motion of the ground below the first bearing."""
+        return self.bearings[0].motion or self.motion
+
+    @property
     def gravity(self) -> float:
         """Acceleration of gravity, that of the bearings [m/s^2]."""
         return self.bearings[0].bearing.gravity
@@ -186,7 +191,13 @@ class BuildingScene:
     @cached_property
     def attachments(self) -> Array:
         """Motion of the upper ends of the bearings: rows, shape (bearings, 6, n) [SI]."""
-        return np.stack([self._attachment(index) for index in range(len(self.bearings))])
+        nodes = [self._node(index) for index in range(len(self.bearings))]
+        return np.stack(
+            [
+                node.rows if mount.position is None else node.linked([*mount.position, node.position[2]])
+                for node, mount in zip(nodes, self.bearings, strict=True)
+            ]
+        )
 
     @cached_property
     def weights(self) -> Array:
@@ -228,12 +239,30 @@ class BuildingScene:
     @cached_property
     def vertical_modes(self) -> VerticalModes:
         """Modes of the building on the vertical springs and dampers of its interfaces."""
-        return vertical_modes(self)
+        from scipy.linalg import eigh
+
+        building, rows = self.building, self.attachments[:, 2]
+        springs, dampers = (
+            rows.T * [getattr(mount.interface, name) for mount in self.bearings] @ rows
+            for name in ("vertical_stiffness", "vertical_damping")
+        )
+        squares, shapes = eigh(building.stiffness + springs, building.mass)
+        rates, stored = (
+            np.einsum("im,ij,jm->m", shapes, matrix, shapes) for matrix in (building.damping + dampers, springs)
+        )
+        squares = np.maximum(squares, 0.0)
+        return VerticalModes(squares, shapes, rates, stored / np.maximum(squares, 1e-9 * squares.max()))
 
     @cached_property
     def effect_selections(self) -> tuple[EffectSelection, ...]:
-        """The effects of every bearing, with the reason for each that is selected."""
-        return select_effects(self)
+        """The effects of every bearing, with the reason for each that is selected. Raises InputError."""
+        if all(isinstance(mount.effects, Effects) for mount in self.bearings):
+            remaining: list[float] = [0.0] * len(self.bearings)  # nothing is selected
+        elif len(set(self.grounds[1])) > 1:
+            remaining = [-np.inf] * len(self.bearings)  # the estimate has one motion of the ground
+        else:
+            remaining = remaining_loads(self).tolist()
+        return tuple(_selected(self, index, share) for index, share in enumerate(remaining))
 
     @property
     def modelled(self) -> tuple[Effects, ...]:
@@ -262,10 +291,6 @@ class BuildingScene:
         if not node.carries:
             raise InputError(f"scene.bearings[{index}].node = {name!r}: no bearing can be attached there")
         return node
-
-    def _attachment(self, index: int) -> Array:
-        node, position = self._node(index), self.bearings[index].position
-        return node.rows if position is None else node.linked([*position, node.position[2]])
 
     def _tension(self, load: float) -> str:
         """Why a bearing carries no compression at rest."""
@@ -318,34 +343,6 @@ class BuildingScene:
                 )
 
 
-def vertical_modes(scene: BuildingScene) -> VerticalModes:
-    """The modes of a building on the vertical springs and dampers of its interfaces."""
-    from scipy.linalg import eigh
-
-    building, rows = scene.building, scene.attachments[:, 2]
-    springs, dampers = (
-        rows.T * [getattr(mount.interface, name) for mount in scene.bearings] @ rows
-        for name in ("vertical_stiffness", "vertical_damping")
-    )
-    squares, shapes = eigh(building.stiffness + springs, building.mass)
-    rates, stored = (
-        np.einsum("im,ij,jm->m", shapes, matrix, shapes) for matrix in (building.damping + dampers, springs)
-    )
-    squares = np.maximum(squares, 0.0)
-    return VerticalModes(squares, shapes, rates, stored / np.maximum(squares, 1e-9 * squares.max()))
-
-
-def select_effects(scene: BuildingScene) -> tuple[EffectSelection, ...]:
-    """The effects of every bearing: as given, or selected. Raises InputError where they exclude each other."""
-    if all(isinstance(mount.effects, Effects) for mount in scene.bearings):
-        remaining: list[float] = [0.0] * len(scene.bearings)  # nothing is selected
-    elif any(_ground(scene, mount) != _ground(scene, scene.bearings[0]) for mount in scene.bearings):
-        remaining = [-np.inf] * len(scene.bearings)  # the estimate has one motion of the ground
-    else:
-        remaining = remaining_loads(scene).tolist()
-    return tuple(_selected(scene, index, share) for index, share in enumerate(remaining))
-
-
 def _selected(scene: BuildingScene, index: int, remaining: float) -> EffectSelection:
     mount = scene.bearings[index]
     requested = Auto() if mount.effects is None else mount.effects
@@ -380,11 +377,6 @@ def _reasons(bearing: Bearing, requested: Auto, remaining: float) -> tuple[Reaso
     )
 
 
-def _ground(scene: BuildingScene, bearing: BuildingBearing) -> Motion:
-    """The motion of the ground below a bearing."""
-    return scene.motion if bearing.motion is None else bearing.motion
-
-
 def remaining_loads(scene: BuildingScene) -> Array:
     """An estimate of the least axial load of every bearing over that at rest, ndarray, shape (bearings,), [-].
 
@@ -393,7 +385,7 @@ def remaining_loads(scene: BuildingScene) -> Array:
     slide, at the largest distance of the ground from its start.
     """
     times = np.arange(0.0, scene.end, STEP)
-    path = _ground(scene, scene.bearings[0]).displacement(times)[:, :2]
+    path = scene.first_ground.displacement(times)[:, :2]
     overturning = _overturning(scene, float(np.linalg.norm(path - path[0], axis=1).max()))
     ratios: Array = 1.0 + (_vertical_response(scene, times).min(axis=0) - overturning) / scene.axial_loads
     return ratios
@@ -411,7 +403,7 @@ def _vertical_response(scene: BuildingScene, times: Array) -> Array:
     dampers = np.array([mount.interface.vertical_damping for mount in scene.bearings])
     squares, modes, rates, _ = scene.vertical_modes
     part = -modes.T @ building.mass @ building.rigid_motions[:, 2]
-    ground = _ground(scene, scene.bearings[0]).acceleration(times)[:, 2]
+    ground = scene.first_ground.acceleration(times)[:, 2]
     loads = np.zeros((len(times), len(rows)))
     for mode, square, rate, force in zip(modes.T, squares, rates, part, strict=True):
         along = rows @ mode
@@ -425,7 +417,8 @@ def _vertical_response(scene: BuildingScene, times: Array) -> Array:
 
 def _overturning(scene: BuildingScene, distance: float) -> Array:
     """Largest change of the axial loads by overturning, shape (bearings,) [N]. distance: of the ground [m]."""
-    share = max(_force_share(mount.bearing, distance) for mount in scene.bearings)
+    surfaces = [bearing.surfaces for bearing in scene.every_bearing]  # all of a bearing slide, by that distance
+    share = max(max(s.friction for s in own) + distance / sum(s.radius for s in own) for own in surfaces)
     motions = scene.building.rigid_motions
     moment = share * scene.gravity * float(np.abs((motions.T @ scene.building.mass @ motions)[0, 4]))
     springs = np.array([mount.interface.vertical_stiffness for mount in scene.bearings])
@@ -435,8 +428,3 @@ def _overturning(scene: BuildingScene, distance: float) -> Array:
     changes = np.divide(moment * springs[:, None] * arms, rocking, where=rocking > 0, out=np.zeros_like(arms))
     largest: Array = np.hypot(*changes.T)
     return largest
-
-
-def _force_share(bearing: Bearing, distance: float) -> float:
-    """Horizontal force over the load of a bearing whose surfaces all slide, by that distance in all [-]."""
-    return max(surface.friction for surface in bearing.surfaces) + distance / sum(s.radius for s in bearing.surfaces)

@@ -81,7 +81,9 @@ def plot_floor_spectra(result: BuildingResult, path: str | Path | None = None) -
         for axis, axes in zip(AXES, row, strict=True):
             for index, (name, values) in enumerate(spectra.items()):
                 style: dict[str, Any] = (
-                    {"color": FAINT, "linestyle": "--"} if name == "ground" else {"color": _floor_colour(index - 1)}
+                    {"color": FAINT, "linestyle": "--"}
+                    if name == "ground"
+                    else {"color": COLOURS[(index - 1) % len(COLOURS)]}
                 )
                 axes.plot(PERIODS, values[:, axis] / G, label=plain(name), **style)
             axes.set(
@@ -240,10 +242,6 @@ def magnification(places: Array, peak: float) -> float:
     wanted = ORBIT * (apart if np.isfinite(apart) else 1.0) / peak if peak > 0 else 1.0
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(power * max(number for number in ROUND if number * power <= wanted * (1 + 1e-9)))
-
-
-def _floor_colour(index: int) -> str:
-    return COLOURS[index % len(COLOURS)]
 
 
 @dataclass(frozen=True)

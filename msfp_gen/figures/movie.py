@@ -123,13 +123,9 @@ def stack_film(result: RunData, times: Array, azimuth: float | None) -> Film:
     """The movie of one bearing at these times [s], its section at `azimuth` [rad]."""
     frames = at_times(result, times)
     drawn_sections = sections(frames, azimuth)
-    return Film(_height(drawn_sections), len(times), lambda figure: _layout(figure, result, frames, drawn_sections))
-
-
-def _height(drawn_sections: list[Section]) -> float:
-    """Height of the movie [inch]: the section over its full width to scale, the loop and the bars below it."""
-    (left, right), (low, high) = limits(drawn_sections)
-    return even(min(TALLEST, (WIDE - 1.0) * (high - low) / (right - left)) + AROUND + BELOW)
+    (left, right), (low, high) = limits(drawn_sections)  # drawn over the full width to scale, loop and bars below it
+    tall = even(min(TALLEST, (WIDE - 1.0) * (high - low) / (right - left)) + AROUND + BELOW)
+    return Film(tall, len(times), lambda figure: _layout(figure, result, frames, drawn_sections))
 
 
 def _layout(figure: Figure, result: RunData, frames: RunData, drawn_sections: list[Section]) -> Layout:

@@ -73,7 +73,8 @@ def plot_section(
     """
     then = at_times(result, peak_time(result) if time is None else time)
     (section,) = sections(then, azimuth)
-    tall = 7.6 if friction_circles else 1.9 + WIDTH * _aspect(section)
+    (left, right), (low, high) = limits([section])
+    tall = 7.6 if friction_circles else 1.9 + WIDTH * (high - low) / (right - left)
     with page(5.6 if friction_circles else WIDTH + 1.2, tall, path) as figure:
         headline(figure, label_of(result))
         axes = figure.subplots()
@@ -217,12 +218,6 @@ def limits(drawn_sections: list[Section]) -> tuple[tuple[float, float], tuple[fl
     (left, low), (right, high) = points.min(axis=0), points.max(axis=0)
     room = OVERHANG * (high - low)
     return (left - room, right + room), (low - 1.2 * room, high + 1.2 * room)
-
-
-def _aspect(section: Section) -> float:
-    """Height over width of the drawn part of a section."""
-    (left, right), (low, high) = limits([section])
-    return (high - low) / (right - left)
 
 
 def direction_of(azimuth: float) -> str:

@@ -95,7 +95,7 @@ def problem_of(scene: Scene, title: str) -> Problem:
         "kind": str(fixed.motion.metadata.get("kind", "")) if hasattr(fixed.motion, "metadata") else "",
         "record": fixed.motion.sampled,
         "amplitude": float(np.abs(fixed.motion.displacement(np.linspace(0.0, fixed.end, 4001))[:, :2]).max()),
-        "period": _period(fixed),
+        "period": float(str(period)) if (period := fixed.motion.metadata.get("period")) is not None else None,
     }
     return Problem(fixed, spec, data)
 
@@ -136,12 +136,6 @@ def run_arguments(scene: Scene, spec: ModelSpec) -> tuple[dict[str, Any], float]
     model = Model(spec, recorder, cast("BuildInfo", None))
     _, azimuth = start_run(scene, model, scene.effect_selection, scene.end, None, ())
     return arguments, azimuth
-
-
-def _period(scene: Scene) -> float | None:
-    """Period of the motion [s]; None where it has none."""
-    period = scene.motion.metadata.get("period")
-    return None if period is None else float(str(period))
 
 
 def _offsets(quantities: tuple[contract.Recorded, ...], surfaces: int) -> dict[str, list[int]]:

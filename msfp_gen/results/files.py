@@ -184,7 +184,8 @@ class ResultFiles:
 
         target, dataset = check_output(path, (".mat",)), self.dataset
         # One-dimensional arrays become column vectors, as usual in MATLAB, and texts become cells.
-        content: dict[str, Any] = {str(name): _matlab(values.to_numpy()) for name, values in dataset.variables.items()}
+        arrays = {str(name): variable.to_numpy() for name, variable in dataset.variables.items()}
+        content: dict[str, Any] = {n: v.astype(object) if v.dtype.kind == "U" else v for n, v in arrays.items()}
         for key, attribute in (("units", "units"), ("meaning", "long_name")):
             content[key] = {str(n): v.attrs[attribute] for n, v in dataset.variables.items() if attribute in v.attrs}
         content["attributes"] = {str(key): value for key, value in dataset.attrs.items()}
@@ -316,10 +317,6 @@ def signed(dataset: xr.Dataset, word: str) -> xr.Dataset:
         raise InputError(f"sign = {word!r}: columns of a building have one sign, base - top; leave it out")
     changed = [name for base in VARIABLES for name in (base, f"event_{base}") if name in dataset]
     return dataset.assign({name: dataset[name].copy(data=factor * dataset[name] + 0.0) for name in changed})  # no -0.0
-
-
-def _matlab(values: Any) -> Any:
-    return values.astype(object) if values.dtype.kind == "U" else values
 
 
 def attributes_of(

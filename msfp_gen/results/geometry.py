@@ -299,8 +299,10 @@ def sections(result: RunData, azimuth: float | None = None) -> list[Section]:
     for row in range(len(stack)):
         bottom, basis = stack.bottom[row], stack.basis[row]
         plane = Plane((bottom + stack.top[row])[1 : max(2, bearing.layout.n - 1)].mean(axis=0) / 2, angle)
-        bodies = [_closed(*cut(shape, bottom[k], basis[k], plane)) for k, shape in enumerate(shapes)]
-        arcs = [_open(*cut(face, bottom[k], basis[k], plane)) for k, face in faces]
+        branches = [cut(shape, bottom[k], basis[k], plane) for k, shape in enumerate(shapes)]
+        bodies = [np.concatenate([right, left[::-1]]) for left, right in branches]
+        branches = [cut(face, bottom[k], basis[k], plane) for k, face in faces]
+        arcs = [np.concatenate([left[::-1], right]) for left, right in branches]
         projected = (stack.contact, stack.centre, stack.line, stack.force)
         sections.append(Section(angle, bodies, arcs, *(plane.project(x[row]) for x in projected)))
     return sections
@@ -333,13 +335,3 @@ def cut(meridian: Array, bottom: Array, basis: Array, plane: Plane) -> tuple[Arr
     half_chord = np.sqrt(np.maximum(square[met], 0.0))[:, None]
     middle = centres[met] - distance[met, None] * second
     return plane.project(middle - half_chord * first), plane.project(middle + half_chord * first)
-
-
-def _closed(left: Array, right: Array) -> Array:
-    """Both branches as a closed polygon."""
-    return np.concatenate([right, left[::-1]])
-
-
-def _open(left: Array, right: Array) -> Array:
-    """Both branches as an open line from edge to edge."""
-    return np.concatenate([left[::-1], right])

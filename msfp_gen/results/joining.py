@@ -69,7 +69,8 @@ class Joint:
         )  # the first segment that took a step, or the last of all
         self.kept: list[tuple[int, int]] = []
         for index, ((_, last), count) in enumerate(zip(ends, counts, strict=True)):
-            between = index < len(counts) - 1 and output_step is not None and _between(last.time[0], output_step)
+            steps = 0.0 if output_step is None else last.time[0] / output_step
+            between = index < len(counts) - 1 and abs(steps - round(steps)) > 1e-6  # the even times of rows
             begin = int(index > beginning)
             self.kept.append((begin, max(begin, count - int(between))) if index >= beginning else (0, 0))
 
@@ -131,12 +132,6 @@ def concatenated(parts: Sequence[History]) -> History:
 
     columns: dict[str, Any] = {name: whole([getattr(part, name) for part in parts]) for name in parts[0].arrays()}
     return History(**columns, energy={name: whole([part.energy[name] for part in parts]) for name in parts[0].energy})
-
-
-def _between(time: float, output_step: float) -> bool:
-    """Whether a time lies between the even times of rows."""
-    steps = time / output_step
-    return bool(abs(steps - round(steps)) > 1e-6)
 
 
 BLOCK = 2**13  # rows that are looked at together

@@ -23,12 +23,7 @@ from msfp_gen.specification.layout import Effects
 
 
 class BearingData(ResultFiles):
-    """What the run of any bearing has, alone or below a building.
-
-    bearing: its values. effects: of its model at the start. axial_load: compression at rest [N]; None: it varies, or
-    there is none. history: its rows. events: none below a building, which does not record them. extremes: over all
-    steps. notes: of its monitors.
-    """
+    """What the run of any bearing has, alone or below a building."""
 
     @property
     def number(self) -> int:
@@ -52,7 +47,7 @@ class BearingData(ResultFiles):
 
         @property
         def axial_load(self) -> float | None:
-            """Compression at rest [N]."""
+            """Compression at rest [N]; None: it varies, or there is none."""
 
         @property
         def history(self) -> BearingRows:
@@ -60,7 +55,7 @@ class BearingData(ResultFiles):
 
         @property
         def events(self) -> tuple[Event, ...]:
-            """In order of time."""
+            """In order of time; none below a building, which does not record them."""
 
         @property
         def extremes(self) -> Extremes:
@@ -69,11 +64,8 @@ class BearingData(ResultFiles):
 
 @dataclass(frozen=True, eq=False)
 class RunData(BearingData):
-    """Scene, rows, events and provenance of a run. `msfp_gen.Result` adds dataset and summary.
+    """The fields of `msfp_gen.Result`, which adds dataset and summary.
 
-    status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one line of
-    text, "" for a run that succeeded. counters: the work of the solver. provenance: versions, model keys and solver
-    options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
     recorded_extremes: of all accepted steps; None where only the rows are known. gradients: derivatives with respect to
     parameters; None: not computed.
     """

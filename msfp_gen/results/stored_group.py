@@ -107,9 +107,12 @@ class StoredGroup:
         """Raise ValueError unless the data lies in the file and has the size that its bytes there can have."""
         if dataset.is_virtual or dataset.external:
             raise ValueError(f"{name} lies in another file")
+        from h5py import h5z
+
+        known = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32} if compressed else set()
         properties = dataset.id.get_create_plist()
         filters = [properties.get_filter(index)[0] for index in range(properties.get_nfilters())]
-        if len(set(filters)) < len(filters) or not set(filters) <= (_known_filters() if compressed else set()):
+        if len(set(filters)) < len(filters) or not set(filters) <= known:
             raise ValueError(f"{name} is compressed, or in an unknown way")
         stored, size = dataset.id.get_storage_size(), math.prod(dataset.shape) * dataset.dtype.itemsize
         chunk = math.prod(dataset.chunks or (0,)) * dataset.dtype.itemsize
@@ -129,12 +132,6 @@ class StoredGroup:
         if not isinstance(value, str | int | float):
             raise ValueError(f"attribute {name} is no text and no number")
         return value
-
-
-def _known_filters() -> set[int]:
-    from h5py import h5z
-
-    return {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from msfp_gen.common.tables import Table, yes
 from msfp_gen.results.dataset import gradients_of
 from msfp_gen.results.files import ResultFiles
 from msfp_gen.results.gradient import Gradients, gradients_of_extremes
-from msfp_gen.results.history import LABELS, BearingRows, History, by_axis
+from msfp_gen.results.history import BearingRows, History, by_axis
 from msfp_gen.results.run_data import BearingData, RunData
 from msfp_gen.results.sliding import SHARE, merged, open_times, slip_shares
 from msfp_gen.scene.bearing import Surface
@@ -157,31 +157,35 @@ def summary_of_run(result: ResultFiles, time: Array, counters: Mapping[str, int]
     }
 
 
-# Extremes that friction laws add -> keys of the summary.
-OF_FRICTION = {"least_friction": "least_friction", "most_friction": "most_friction", "temperature": "peak_temperature"}
+# Extremes of surfaces -> keys of the summary; those that not every run has are left out of it.
+OF_SURFACES = {
+    "sliding": "peak_sliding",
+    "gap": "minimum_gap",
+    "least_normal": "minimum_normal_force",
+    "most_normal": "maximum_normal_force",
+    "least_friction": "least_friction",
+    "most_friction": "most_friction",
+    "temperature": "peak_temperature",
+}
 
 
 def summary_of_bearing(one: BearingData) -> dict[str, Any]:
     """The part of a summary that all bearings have, alone or below a building."""
     extremes, load, sheet = one.extremes, one.axial_load, one.bearing.friction_at_pivot
     force = by_axis(extremes.top_force)
+    recorded = {key: getattr(extremes, name) for name, key in OF_SURFACES.items()}
     summary = {
         "peak_displacement": by_axis(extremes.displacement),
         "peak_force": force,
         "axial_load": load,
         "peak_force_ratio": force["radial"] / load if load else None,
-        "peak_sliding": extremes.sliding.tolist(),
-        "minimum_gap": extremes.gap.tolist(),
-        "minimum_normal_force": extremes.least_normal.tolist(),
-        "maximum_normal_force": extremes.most_normal.tolist(),
+        **{key: values.tolist() for key, values in recorded.items() if values is not None},
         "peak_rim_force": None if extremes.rim_force is None else extremes.rim_force.tolist(),
         "friction": [surface.friction for surface in one.bearing.surfaces],
         "friction_at_pivot": None if sheet is None else list(sheet),
         "uplift": uplift_of(one),
         "rims_met": rims_met(one),
     }
-    recorded = {key: getattr(extremes, name) for name, key in OF_FRICTION.items()}
-    summary |= {key: values.tolist() for key, values in recorded.items() if values is not None}
     return summary | ({"transitions": transitions(one)} if is_monotonic(one) else {})
 
 
@@ -291,17 +295,12 @@ def summarise_gradients(result: RunData) -> dict[str, dict[str, Any]]:
 
 
 def _summary(gradients: Gradients, index: int, slopes: dict[str, Array], ratio: float | None) -> SummaryGradient:
-    names = (*LABELS["axis"], "radial")
     gradient = SummaryGradient(
-        peak_displacement=dict(zip(names, slopes["displacement"].tolist(), strict=True)),
-        peak_force=dict(zip(names, slopes["top_force"].tolist(), strict=True)),
+        peak_displacement=by_axis(slopes["displacement"]),
+        peak_force=by_axis(slopes["top_force"]),
         peak_force_ratio=ratio,
-        peak_sliding=slopes["sliding"].tolist(),
-        minimum_gap=slopes["gap"].tolist(),
-        minimum_normal_force=slopes["least_normal"].tolist(),
-        maximum_normal_force=slopes["most_normal"].tolist(),
+        **{key: slopes[name].tolist() for name, key in OF_SURFACES.items() if name in slopes},
     )
-    gradient |= {key: slopes[name].tolist() for name, key in OF_FRICTION.items() if name in slopes}
     energy = {name.removeprefix("energy_"): v for name, v in gradients.arrays.items() if name.startswith("energy_")}
     if "input" in energy:
         gradient["energy"] = {name: float(values[index, -1]) for name, values in energy.items()}

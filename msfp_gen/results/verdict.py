@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -242,19 +242,15 @@ def _temperature(one: BearingData, limits: Limits) -> Iterator[Value]:
             yield Value(note.surface, note.time, start + note.value, limits.temperature)
 
 
-def _of_bearing(one: BearingData, rows: Array, reached: float, allowed: float | None) -> Iterator[Value]:
-    """The value of a whole bearing, where a limit is given. rows: shape (T,), of which the largest has the time."""
-    if allowed is not None:
-        yield Value(0, float(one.history.time[rows.argmax()]), reached, allowed)
-
-
-def _axial_load(one: BearingData, limits: Limits) -> Iterator[Value]:
-    rows = np.abs(one.history.top_force[:, 2])
-    return _of_bearing(one, rows, float(one.extremes.top_force[2]), limits.axial_load)
-
-
-def _displacement(one: BearingData, limits: Limits) -> Iterator[Value]:
-    return _of_bearing(one, one.history.horizontal, float(one.extremes.displacement[3]), limits.displacement)
+def _of_bearing(one: BearingData, limits: Limits, name: str) -> Iterator[Value]:
+    """The axial load or the displacement of a whole bearing, where a limit is given."""
+    history, extremes = one.history, one.extremes
+    rows, reached = {
+        "axial_load": (np.abs(history.top_force[:, 2]), extremes.top_force[2]),
+        "displacement": (history.horizontal, extremes.displacement[3]),
+    }[name]
+    if (allowed := getattr(limits, name)) is not None:
+        yield Value(0, float(history.time[rows.argmax()]), float(reached), allowed)
 
 
 def _noted(kind: str, allowed: Callable[[Bearing, int], float]) -> Reader:
@@ -293,7 +289,7 @@ LIMITS = (
     Limit("uplift_duration", "time for which a surface is open", "s", _uplift_duration),
     Limit("face", "contact off the axis of the slider", "m", _face),
     Limit("temperature", "temperature", "degC", _temperature),
-    Limit("axial_load", "axial load", "N", _axial_load),
-    Limit("displacement", "displacement", "m", _displacement),
+    Limit("axial_load", "axial load", "N", partial(_of_bearing, name="axial_load")),
+    Limit("displacement", "displacement", "m", partial(_of_bearing, name="displacement")),
 )
 """All limits in the order of tables; those that `Limits` has as fields can be given."""

@@ -213,15 +213,11 @@ def _entries(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     if isinstance(value, dict):
         for key, item in value.items():
             yield from _entries(item, f"{path}.{key}" if path else key)
-    elif _is_rows(value):
+    elif isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
         for index, item in enumerate(value):
             yield from _entries(item, f"{path}[{index}]")
     else:
         yield path, value
-
-
-def _is_rows(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
 
 
 def _short(value: Any) -> str:

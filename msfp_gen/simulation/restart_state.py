@@ -82,7 +82,9 @@ def transferred_state(bearing: Bearing, top: Top, model: Model, at: RestartState
     separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
     q, v = q[:, :3], v[:, :3]
     if at.planar and not model.planar:
-        if _is_oblique(at.azimuth):  # to order tilt squared only, plates would jump against stiff springs
+        # Not E1-E3 nor E2-E3, whose tilts are theta or psi alone: to order tilt squared only, plates would jump against
+        # stiff springs.
+        if min(abs(at.azimuth), abs(at.azimuth - np.pi / 2)) > 1e-9:
             q, v, twist = tilts_out_of_plane(q, v, at.azimuth)
             f = np.concatenate([rotated_pairs(pair[None], t - at.azimuth) for pair, t in zip(f, twist, strict=True)])
         else:
@@ -99,11 +101,6 @@ def transferred_state(bearing: Bearing, top: Top, model: Model, at: RestartState
             separations = (-force / seat_stiffness(bearing, top)[:, None], np.zeros_like(force))
         q, v = np.hstack([q, separations[0]]), np.hstack([v, separations[1]])
     return np.ascontiguousarray(q), np.ascontiguousarray(v), np.ascontiguousarray(f)
-
-
-def _is_oblique(azimuth: float) -> bool:
-    """Whether a plane is neither E1-E3 nor E2-E3, whose tilts are theta or psi alone."""
-    return min(abs(azimuth), abs(azimuth - np.pi / 2)) > 1e-9
 
 
 def transferred_heights(

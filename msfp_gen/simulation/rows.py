@@ -159,12 +159,6 @@ class RowFile:
         else:
             self._file = path.open("r+b" if resume and path.exists() else "w+b", buffering=0)
 
-    @classmethod
-    def of_segment(cls, checkpoint: Path | None, folder: Path, model: Model, resume: bool) -> RowFile:
-        """That of a new segment: beside its checkpoint, if it has one, else in `folder`."""
-        path = None if checkpoint is None else rows_beside(checkpoint)
-        return cls(path, folder, model.extension.ROW_SIZE, resume)
-
     def __del__(self) -> None:
         if hasattr(self, "_file"):
             self._file.close()

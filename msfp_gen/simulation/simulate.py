@@ -30,7 +30,6 @@ from msfp_gen.scene.file.loader import dumps
 from msfp_gen.scene.parameters import Parameter
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import is_sprung
-from msfp_gen.simulation.building_run import BuildingRun
 from msfp_gen.simulation.building_run import result_of as building_result
 from msfp_gen.simulation.building_run import start_run as start_building
 from msfp_gen.simulation.checkpoint import (
@@ -70,6 +69,7 @@ from msfp_gen.simulation.rows import (
     events_of,
     finite_rows,
     history_of,
+    rows_beside,
     start_temperatures,
 )
 from msfp_gen.simulation.start import (
@@ -288,7 +288,10 @@ class RunSequence:
         start = time.perf_counter()
         model = build_model(scene.bearing.layout, effects, gradients=bool(self.parameters))
         checkpoint = None if saved is None else Checkpoint(saved, Identity.of(scene, model), every, resume)
-        stored = None if self.stream is None else RowFile.of_segment(saved, self.stream.parent, model, resume)
+        stored = None
+        if self.stream is not None:
+            path = None if saved is None else rows_beside(saved)
+            stored = RowFile(path, self.stream.parent, model.extension.ROW_SIZE, resume)
         run, azimuth = self.start_segment(model)
         if checkpoint is not None:
             checkpoint.restore(run, stored)
@@ -430,12 +433,18 @@ def _simulate_building(
     """`simulate` of a building; the RunError names the bearing."""
     begin = time.monotonic()
     run = start_building(scene, threads)
-    saved = None if checkpoint is None else Checkpoint(checkpoint, _building_identity(run), every, resume)
-    if saved is not None:
+    saved = None
+    if checkpoint is not None:
+        motion = {"name": scene.motion.name, "duration": scene.motion.duration}
+        identity = Identity(run.build, scene_text(scene) + dumps({"motion": motion}), fingerprint(scene))
+        saved = Checkpoint(checkpoint, identity, every, resume)
         saved.restore(run)
     status = _advance(run, lambda: run.run.advance(BUILDING_STEPS_PER_CALL) or run.switch(), scene.end, progress, saved)
-    message = "" if status == "ok" else _building_message(run, status)
-    result = None
+    message, result = "", None
+    if status != "ok":
+        _, bearing, surface, value = run.status
+        who = scene.label(bearing - 1) if bearing else "building"
+        message = f"{who}: {stopped(run.time, scene.end, status, surface, value)}"
     if status == "ok" or run.run.row_count:
         about = provenance_of(scene.solver, ", ".join(spec.key for spec in scene.specs))
         ended: dict[str, Any] = {"status": status, "message": message, "wall_time": time.monotonic() - begin}
@@ -443,15 +452,3 @@ def _simulate_building(
     if result is None or message:
         raise RunError(message, status=status, result=result)
     return result
-
-
-def _building_message(run: BuildingRun, status: str) -> str:
-    """One line with bearing, time, surface, cause and remedy."""
-    _, bearing, surface, value = run.status
-    who = run.scene.label(bearing - 1) if bearing else "building"
-    return f"{who}: {stopped(run.time, run.scene.end, status, surface, value)}"
-
-
-def _building_identity(run: BuildingRun) -> Identity:
-    motion = {"name": run.scene.motion.name, "duration": run.scene.motion.duration}
-    return Identity(run.build, scene_text(run.scene) + dumps({"motion": motion}), fingerprint(run.scene))
