@@ -17,7 +17,7 @@ from msfp_gen.buildings.summary import BuildingCharacterisation
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.results.files import Storage
-from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Event, Extremes
+from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Event, Extremes, by_axis
 from msfp_gen.results.note import Note
 from msfp_gen.results.result import AnyResult, Curve, OneBearing, Rows
 from msfp_gen.results.summary import summary_of_bearing, time_row
@@ -209,12 +209,37 @@ class BuildingResult(AnyResult):
     @property
     def floors(self) -> list[dict[str, Any]]:
         """Peaks of every node, as in the summary."""
-        return summaries.floor_rows(self.scene.building, self.extremes)
+        peaks = (self.extremes.node_acceleration, self.extremes.node_displacement)
+        return [
+            {
+                "name": node.name,
+                "height": float(node.position[2]),
+                "peak_acceleration": by_axis(acceleration),
+                "peak_displacement": by_axis(moved),
+            }
+            for node, acceleration, moved in zip(self.scene.building.nodes, *peaks, strict=True)
+        ]
 
     @property
     def storeys(self) -> list[dict[str, Any]]:
         """Peaks of every storey, as in the summary."""
-        return summaries.storey_rows(self.scene.building, self.extremes)
+        nodes, extremes, rows = self.scene.building.nodes, self.extremes, []
+        for index, column in enumerate(self.scene.building.columns):
+            height = float(nodes[index + 1].position[2] - nodes[index].position[2])
+            drifts, corner = by_axis(extremes.drift[index]), by_axis(extremes.corner_drift[index])
+            rows.append(
+                {
+                    "name": column.name,
+                    "height": height,
+                    "peak_drift": drifts,
+                    "peak_drift_ratio": drifts["radial"] / height,
+                    "peak_corner_drift": corner,
+                    "peak_corner_drift_ratio": corner["radial"] / height,
+                    "peak_shear": by_axis(extremes.storey_shear[index]),
+                    "peak_torsion": float(extremes.storey_torsion[index]),
+                }
+            )
+        return rows
 
     def main_results(self) -> Rows:
         """Label and value of the main results."""

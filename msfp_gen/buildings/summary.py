@@ -8,8 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from msfp_gen.buildings.building import Building
-from msfp_gen.buildings.extremes import BuildingExtremes
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.results.characterise import Characterisation, characterised, effective_period
 from msfp_gen.results.history import by_axis
@@ -56,42 +54,6 @@ def summarise(result: Any) -> dict[str, Any]:
 
 def _largest(peaks: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return {key: max(one[key] for one in peaks) for key in peaks[0]}
-
-
-def floor_rows(building: Building, extremes: BuildingExtremes) -> list[dict[str, Any]]:
-    """Peaks of every node: name, height [m], peak_acceleration [m/s^2], peak_displacement from the ground [m]."""
-    return [
-        {
-            "name": node.name,
-            "height": float(node.position[2]),
-            "peak_acceleration": by_axis(acceleration),
-            "peak_displacement": by_axis(moved),
-        }
-        for node, acceleration, moved in zip(
-            building.nodes, extremes.node_acceleration, extremes.node_displacement, strict=True
-        )
-    ]
-
-
-def storey_rows(building: Building, extremes: BuildingExtremes) -> list[dict[str, Any]]:
-    """Peaks of every storey, as of `BuildingResult.summary`."""
-    nodes, rows = building.nodes, []
-    for index, column in enumerate(building.columns):
-        height = float(nodes[index + 1].position[2] - nodes[index].position[2])
-        drifts, corner = by_axis(extremes.drift[index]), by_axis(extremes.corner_drift[index])
-        rows.append(
-            {
-                "name": column.name,
-                "height": height,
-                "peak_drift": drifts,
-                "peak_drift_ratio": drifts["radial"] / height,
-                "peak_corner_drift": corner,
-                "peak_corner_drift_ratio": corner["radial"] / height,
-                "peak_shear": by_axis(extremes.storey_shear[index]),
-                "peak_torsion": float(extremes.storey_torsion[index]),
-            }
-        )
-    return rows
 
 
 def work_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -229,20 +191,6 @@ class BearingDemand:
     residual_displacement: float | None
     dissipated: float
 
-    @classmethod
-    def of(cls, summary: Mapping[str, Any], residual_displacement: float | None) -> BearingDemand:
-        """From the summary of a bearing."""
-        return cls(
-            summary["number"],
-            summary["name"],
-            summary["peak_displacement"]["radial"],
-            min(summary["minimum_gap"]),
-            summary["minimum_load_ratio"],
-            summary["maximum_load_ratio"],
-            residual_displacement,
-            summary["dissipated"],
-        )
-
 
 @dataclass(frozen=True, repr=False)
 class BuildingCharacterisation(Characterisation):
@@ -270,6 +218,7 @@ class BuildingCharacterisation(Characterisation):
     def of(cls, result: Any) -> BuildingCharacterisation:
         """Characterise the run of a `BuildingResult`. Raises InputError where the bearings did not move."""
         mean, summary = np.mean([one.history.displacement for one in result.bearings], axis=0), result.summary
+        paths = [one.history.displacement[:, :2] for one in result.bearings]
         path = ForcePath.of(result.time, mean, result.base_reaction, "the building")
         peaks = (float(result.extremes.mean_displacement[3]), summary["peak_force"]["radial"])
         load, gravity = result.scene.weight, result.scene.gravity
@@ -282,9 +231,17 @@ class BuildingCharacterisation(Characterisation):
             peak_floor_acceleration=summary["peak_floor_acceleration"]["radial"],
             peak_drift_ratio=summary["peak_drift_ratio"],
             bearings=tuple(
-                BearingDemand.of(one.summary, float(np.hypot(*u[-1])) if rests(result.time, u) else None)
-                for one in result.bearings
-                for u in [one.history.displacement[:, :2]]
+                BearingDemand(
+                    one["number"],
+                    one["name"],
+                    one["peak_displacement"]["radial"],
+                    min(one["minimum_gap"]),
+                    one["minimum_load_ratio"],
+                    one["maximum_load_ratio"],
+                    float(np.hypot(*u[-1])) if rests(result.time, u) else None,
+                    one["dissipated"],
+                )
+                for one, u in zip(summary["bearings"], paths, strict=True)
             ),
         )
 

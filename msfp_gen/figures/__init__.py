@@ -1,5 +1,7 @@
 """Figures of runs and records in one style (docs/figures.md). Each function returns a figure and can write its file.
 
+A path that cannot be written raises InputError, before anything is drawn.
+
 matplotlib is imported when the first figure is drawn.
 """
 

@@ -54,8 +54,8 @@ SIDE = 0.02  # least displacement along a horizontal axis that is drawn, over th
 def plot_loops(result: BearingData, path: str | Path | None = None) -> Figure:
     """Loops of the top force [kN] over the displacement across the bearing [mm], along each horizontal axis that moves.
 
-    The right axis gives force over axial load; the first contact of every rim is marked. Raises InputError for a path
-    that cannot be written. result: also one bearing of a building, with the axial load at rest.
+    The right axis gives force over axial load; the first contact of every rim is marked. result: also one bearing of a
+    building, with the axial load at rest.
     """
     axes = moving_axes(result)
     with page(6.2 * len(axes), 4.8, path) as figure:
@@ -66,10 +66,7 @@ def plot_loops(result: BearingData, path: str | Path | None = None) -> Figure:
 
 
 def plot_orbit(result: BearingData, path: str | Path | None = None) -> Figure:
-    """Orbits in the horizontal plane: displacement across the bearing [mm], and force on the top support [kN].
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Orbits in the horizontal plane: displacement across the bearing [mm], and force on the top support [kN]."""
     with page(10.4, 5.2, path) as figure:
         headline(figure, label_of(result))
         left, right = figure.subplots(1, 2)
@@ -168,10 +165,7 @@ BAR, EDGE = 0.56, 0.16  # heights of the bars for sliding and for rim contact, i
 
 
 def plot_sliding(result: BearingData, path: str | Path | None = None) -> Figure:
-    """Sliding displacement of every surface [mm] over time, with its capacity and the rim contacts.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Sliding displacement of every surface [mm] over time, with its capacity and the rim contacts."""
     with page(9.5, max(4.8, 1.2 * result.history.surfaces + 1), path) as figure:
         headline(figure, label_of(result))
         draw_sliding(figure, result)
@@ -181,7 +175,7 @@ def plot_sliding(result: BearingData, path: str | Path | None = None) -> Figure:
 def plot_stages(result: RunData, path: str | Path | None = None) -> Figure:
     """Sliding regimes over time: when each surface slides or touches its rim, below the displacement of the bearing.
 
-    `results.sliding` defines when a surface slides. Raises InputError for a path that cannot be written.
+    `results.sliding` defines when a surface slides.
     """
     count = result.history.surfaces
     with page(9.5, 2.8 + 0.45 * count, path) as figure:
@@ -278,7 +272,7 @@ VISIBLE = 1e-3  # least peak of a term that is drawn, over the largest input
 def plot_energy(result: RunData, path: str | Path | None = None) -> Figure:
     """Energy balance: dissipated and stored energy stacked over time with the input, and the numerical term below.
 
-    Terms below 0.1 % of the largest input are left out. Raises InputError for a path that cannot be written.
+    Terms below 0.1 % of the largest input are left out.
     """
     energy = result.history.energy
     peak = max(float(np.abs(energy["input"]).max()), np.finfo(float).tiny)

@@ -46,10 +46,7 @@ AXES = range(3)
 
 
 def plot_plan(result: BuildingResult, path: str | Path | None = None) -> Figure:
-    """Plan with the orbit of every bearing, magnified, its peak, and the centre of mass.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Plan with the orbit of every bearing, magnified, its peak, and the centre of mass."""
     with page(8.6, 7.0, path) as figure:
         headline(figure, title_of(result))
         draw_plan(figure.subplots(), result)
@@ -57,10 +54,7 @@ def plot_plan(result: BuildingResult, path: str | Path | None = None) -> Figure:
 
 
 def plot_profile(result: BuildingResult, path: str | Path | None = None) -> Figure:
-    """Peaks over the height: floor accelerations, drifts of the storeys, storey shears over the weight.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Peaks over the height: floor accelerations, drifts of the storeys, storey shears over the weight."""
     with page(11.5, 4.8, path) as figure:
         headline(figure, title_of(result))
         draw_profile(panels(figure, *PROFILES, sharey=True), result)
@@ -68,10 +62,7 @@ def plot_profile(result: BuildingResult, path: str | Path | None = None) -> Figu
 
 
 def plot_floor_spectra(result: BuildingResult, path: str | Path | None = None) -> Figure:
-    """Response spectra of the accelerations of all floors and of the ground, 5 % damping, along E1, E2 and E3.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Response spectra of the accelerations of all floors and of the ground, 5 % damping, along E1, E2 and E3."""
     names = [node.name for node in result.scene.building.nodes]
     spectra = {"ground": _spectrum(result.time, result.ground[:, 2])}
     spectra |= {name: _spectrum(result.time, result.node(name)[:, 2, :3]) for name in names}
@@ -98,10 +89,7 @@ def plot_floor_spectra(result: BuildingResult, path: str | Path | None = None) -
 
 
 def plot_axial_forces(result: BuildingResult, path: str | Path | None = None) -> Figure:
-    """Axial force of every bearing: over time, over that at rest, and the range of each.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Axial force of every bearing: over time, over that at rest, and the range of each."""
     with page(11.5, max(4.6, 1.5 + 0.22 * len(result.scene.bearings)), path) as figure:
         headline(figure, title_of(result))
         left, right = figure.subplots(1, 2, width_ratios=(1.6, 1))
@@ -111,10 +99,7 @@ def plot_axial_forces(result: BuildingResult, path: str | Path | None = None) ->
 
 
 def plot_building(result: BuildingResult, path: str | Path | None = None) -> Figure:
-    """Overview: plan with orbits, profiles over the height, range of the axial force of every bearing.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Overview: plan with orbits, profiles over the height, range of the axial force of every bearing."""
     with page(13.0, 8.6, path) as figure:
         headline(figure, _overview_title(result))
         (above,), (below,) = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.35, 1))

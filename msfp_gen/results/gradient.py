@@ -43,12 +43,6 @@ class Gradients:
     extremes: tuple[Extremes, ...]
     error: Gradients | None = None
 
-    def largest_numbers(self) -> Array:
-        """Largest magnitude of all derivatives by each parameter, shape (k,) [SI]; not finite if one is not."""
-        arrays = self.arrays.values()
-        largest: Array = np.max([np.abs(a).max(axis=tuple(range(1, a.ndim)), initial=0.0) for a in arrays], axis=0)
-        return largest
-
 
 def gradients_of_extremes(gradients: Gradients, history: History, recorded: Extremes) -> dict[str, Array]:
     """Derivatives of `RunData.extremes` by name, each of shape (k, number of values) [SI]."""

@@ -30,23 +30,10 @@ class Joint:
     segments that took no step, the row of its start is that of the first model that went on: forces of massless sliders
     at a start out of balance are not those of the run. Energies continue from their last values.
 
-    Parameters
-    ----------
-    ends
-        Of each segment its first and its last row, each a history of one row.
-    counts
-        Number of rows of each segment.
-    output_step
-        Distance of rows [s]; rows at the end of a segment between them are left out. None: rows of every step.
-    before
-        Values of what only later models record, in the rows of earlier ones: name -> row. Others have their first
-        value.
-
-    Attributes
-    ----------
-    kept
-        Of each segment the rows that remain, as first and end.
-
+    ends: of each segment its first and its last row, each a history of one row. counts: number of rows of each segment.
+    output_step: distance of rows [s]; rows at the end of a segment between them are left out; None: rows of every step.
+    before: values of what only later models record, in the rows of earlier ones: name -> row; others have their first
+    value. Attribute kept: of each segment the rows that remain, as first and end.
     """
 
     def __init__(

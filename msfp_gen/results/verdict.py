@@ -131,14 +131,10 @@ class Verdict:
 
     def _line(self, reading: Reading) -> str:
         limit, (_, time, reached, allowed) = reading.limit, reading.value
-        others = self._bearings(limit.key) - 1
+        others = len({one.bearing for one in self.exceeded if one.limit.key == limit.key}) - 1
         more = f", and {others} other bearing{'s' * (others > 1)}" if others > 0 else ""
         where = ", ".join(filter(None, [reading.place, f"{time:.4g} s"]))
         return f"{limit.name} {limit.shown(reached)}, limit {limit.shown(allowed)} ({where}{more})"
-
-    def _bearings(self, key: str) -> int:
-        """Number of bearings beyond a limit."""
-        return len({reading.bearing for reading in self.exceeded if reading.limit.key == key})
 
     @property
     def table(self) -> Table:

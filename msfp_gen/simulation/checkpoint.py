@@ -78,22 +78,9 @@ class Identity:
 class Checkpoint:
     """The checkpoint file of one segment of a run.
 
-    Parameters
-    ----------
-    path
-        The file; its folder must exist.
-    identity
-        Scene and build of the run.
-    every
-        Wall time between two checkpoints [s]; 0: as often as possible.
-    resume
-        Continue from the state in the file. Without `resume` the file must not exist.
-
-    Raises
-    ------
-    InputError
-        The file does not exist, is damaged, or belongs to another scene or build; or it would be overwritten.
-
+    path: the file; its folder must exist. identity: scene and build of the run. every: wall time between two of them
+    [s]; 0: as often as possible. resume: continue from the state in the file, which otherwise must not exist. Raises
+    InputError where the file does not exist, is damaged, or belongs to another scene or build; or would be overwritten.
     """
 
     def __init__(self, path: str | Path, identity: Identity, every: float = EVERY, resume: bool = False) -> None:

@@ -323,8 +323,8 @@ def run_gradients(
     gradients = _computed(segment, parameters, terms, rows, is_sprung(scene.top))
     steps, undamped = segment.run.counts["steps"], undamped_surfaces(scene, effects)
     resolved = undamped and segment.run.time < steps * RESOLVED_SHARE * slider_period(scene)
-    for parameter, size in zip(parameters, gradients.largest_numbers(), strict=True):
-        if resolved or not np.isfinite(size):
+    for index, parameter in enumerate(parameters):
+        if resolved or not all(np.isfinite(values[index]).all() for values in gradients.arrays.values()):
             raise InputError(f"gradients = {parameter.path!r}: {RINGING}")
     return gradients
 
@@ -434,18 +434,12 @@ def measured_errors(result: Result, finer: Result) -> Gradients:
         name: (of_events if name in EVENTS else of_rows)(values, theirs.arrays[name])
         for name, values in ours.arrays.items()
     }
-    return Gradients(ours.parameters, errors, _of_extremes(result, finer))
-
-
-def _of_extremes(result: Result, finer: Result) -> tuple[Extremes, ...]:
-    """Errors of the derivatives of the extremes that the summary states, by parameter."""
-    ours, theirs = _slopes(result), _slopes(finer)
-    count = len(next(iter(ours.values())))
-    errors = {name: ERROR_FACTOR * np.abs(values - theirs[name]) for name, values in ours.items()}
-    return tuple(Extremes(**{name: values[i] for name, values in errors.items()}) for i in range(count))
-
-
-def _slopes(result: Result) -> dict[str, Array]:
-    assert result.gradients is not None
-    assert result.recorded_extremes is not None
-    return gradients_of_extremes(result.gradients, result.history, result.recorded_extremes)
+    slopes, finer_slopes = (
+        gradients_of_extremes(run.gradients, run.history, run.recorded_extremes)  # type: ignore[arg-type]  # it has both
+        for run in (result, finer)
+    )
+    of_extremes = {name: ERROR_FACTOR * np.abs(values - finer_slopes[name]) for name, values in slopes.items()}
+    extremes = [
+        Extremes(**{name: values[i] for name, values in of_extremes.items()}) for i in range(len(ours.parameters))
+    ]
+    return Gradients(ours.parameters, errors, tuple(extremes))

@@ -136,17 +136,8 @@ def rows_beside(checkpoint: Path) -> Path:
 class RowFile:
     """The rows of one segment in a file, but for the last, which the run holds.
 
-    Parameters
-    ----------
-    path
-        The file, which stays; None: one without a name in `folder`, which goes with this object.
-    folder
-        Of the result.
-    size
-        Numbers in a row.
-    resume
-        Continue with the rows in the file; otherwise they are removed.
-
+    path: the file, which stays; None: one without a name in `folder`, that of the result, which goes with this object.
+    size: numbers in a row. resume: continue with the rows in the file; otherwise they are removed.
     """
 
     def __init__(self, path: Path | None, folder: Path, size: int, resume: bool = False) -> None:
