@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 
 from msfp_gen import simulate_batch
 from msfp_gen.common.arrays import Array
-from msfp_gen.figures import COLOURS, INK, page
+from msfp_gen.figures.style import COLOURS, INK, page
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOK = ROOT / "examples" / "design.ipynb"

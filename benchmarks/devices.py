@@ -23,7 +23,7 @@ from reference.friction_circle import Transition, centres, force_at, transitions
 
 from msfp_gen import Bearing, load_scene, simulate  # noqa: E402
 from msfp_gen.common.output import replacing  # noqa: E402
-from msfp_gen.figures import COLOURS, FAINT, INK, MILLI, page  # noqa: E402
+from msfp_gen.figures.style import COLOURS, FAINT, INK, MILLI, page  # noqa: E402
 from msfp_gen.results.result import Result  # noqa: E402
 
 MARKS = ("<!-- numbers: python benchmarks/devices.py -->\n", "<!-- end -->\n")

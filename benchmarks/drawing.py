@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from msfp_gen.figures import COLOURS, FAINT, INK, MILLI, page, panels
+from msfp_gen.figures.style import COLOURS, FAINT, INK, MILLI, page, panels
 from msfp_gen.scene.top import RigTop
 
 if TYPE_CHECKING:

@@ -64,24 +64,24 @@ def draw_runs(folder: Path) -> None:
 
 def draw_layouts(folder: Path) -> None:
     """A section of every kind of device at rest: numbers of bodies in black, of surfaces in their colours."""
-    with figures.page(11.0, 4.2, folder / "layouts.png") as figure:
+    with style.page(11.0, 4.2, folder / "layouts.png") as figure:
         for axes, (scene, title) in zip(figure.subplots(2, 3).flat, DEVICES.items(), strict=True):
             given = load_scene(scene)
             result = simulate(replace(given, duration=0.05, output_step=None, stop=None))
             (section,) = sections(at_times(result, 0.0))
             for polygon in section.bodies:
-                axes.fill(*(polygon * figures.MILLI).T, facecolor="#DCE1E7", edgecolor=figures.INK, linewidth=0.7)
+                axes.fill(*(polygon * style.MILLI).T, facecolor="#DCE1E7", edgecolor=style.INK, linewidth=0.7)
             for number, face in enumerate(section.faces, start=1):
-                colour, (x, z) = style.colour(number), face[-1] * figures.MILLI
-                axes.plot(*(face * figures.MILLI).T, color=colour, linewidth=2)
-                side = max(polygon[:, 0].max() for polygon in section.bodies) * figures.MILLI
+                colour, (x, z) = style.colour(number), face[-1] * style.MILLI
+                axes.plot(*(face * style.MILLI).T, color=colour, linewidth=2)
+                side = max(polygon[:, 0].max() for polygon in section.bodies) * style.MILLI
                 axes.annotate(
                     str(number), (x, z), (1.12 * side, z), va="center", color=colour, fontweight="bold",
                     arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.7},
                 )  # fmt: skip
             for number, polygon in enumerate(section.bodies, start=1):
                 middle = polygon[np.abs(polygon[:, 0]) < 1e-3][:, 1]
-                axes.text(0, figures.MILLI * middle.mean(), str(number), ha="center", va="center", fontsize=8)
+                axes.text(0, style.MILLI * middle.mean(), str(number), ha="center", va="center", fontsize=8)
             layout = given.bearing.layout
             axes.set_title(f"{title}: ({layout.n}, {layout.m}, {layout.p})", fontsize=10)
             axes.set_aspect("equal")

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures.bearing import (
-    moving_axes,
     plot_energy,
     plot_force_path,
     plot_loops,
@@ -32,19 +31,6 @@ from msfp_gen.figures.building import (
 from msfp_gen.figures.charts import plot_correction, plot_response_spectrum, plot_work_precision
 from msfp_gen.figures.movie import MOVIE_SUFFIXES, animate, check_movie
 from msfp_gen.figures.section import plot_section
-from msfp_gen.figures.style import (
-    COLOURS,
-    FAINT,
-    INK,
-    MILLI,
-    STYLE,
-    displacement,
-    displacement_label,
-    engineering,
-    force,
-    page,
-    panels,
-)
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.sign import using_sign
 
@@ -54,22 +40,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BUILDING_FIGURES",
-    "COLOURS",
-    "FAINT",
     "FIGURES",
-    "INK",
-    "MILLI",
     "MOVIE_SUFFIXES",
-    "STYLE",
     "animate",
     "check_movie",
-    "displacement",
-    "displacement_label",
-    "engineering",
-    "force",
-    "moving_axes",
-    "page",
-    "panels",
     "plot_axial_forces",
     "plot_building",
     "plot_correction",

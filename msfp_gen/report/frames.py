@@ -19,8 +19,8 @@ from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.common.version import __version__
-from msfp_gen.figures import COLOURS
 from msfp_gen.figures.building import DEPTH, height_of, level_of, plan_of, size_of
+from msfp_gen.figures.style import COLOURS
 from msfp_gen.results.geometry import POINTS, Poses, friction_circles, outline, poses
 from msfp_gen.results.history import History
 from msfp_gen.results.joining import at_times

@@ -438,8 +438,6 @@ def measured_errors(result: Result, finer: Result) -> Gradients:
         gradients_of_extremes(run.gradients, run.history, run.recorded_extremes)  # type: ignore[arg-type]  # it has both
         for run in (result, finer)
     )
-    of_extremes = {name: ERROR_FACTOR * np.abs(values - finer_slopes[name]) for name, values in slopes.items()}
-    extremes = [
-        Extremes(**{name: values[i] for name, values in of_extremes.items()}) for i in range(len(ours.parameters))
-    ]
+    peaks = {name: ERROR_FACTOR * np.abs(values - finer_slopes[name]) for name, values in slopes.items()}
+    extremes = (Extremes(**{name: values[i] for name, values in peaks.items()}) for i in range(len(ours.parameters)))
     return Gradients(ours.parameters, errors, tuple(extremes))

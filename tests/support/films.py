@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.figures import movie, page
+from msfp_gen.figures import movie
+from msfp_gen.figures.style import page
 
 
 class Drawn(NamedTuple):

@@ -16,9 +16,19 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError, prefixed
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_columns
-from msfp_gen.figures import COLOURS, INK, displacement, displacement_label, engineering, force, page
 from msfp_gen.figures.bearing import axes_along
-from msfp_gen.figures.style import THIN, headline, subscript
+from msfp_gen.figures.style import (
+    COLOURS,
+    INK,
+    THIN,
+    displacement,
+    displacement_label,
+    engineering,
+    force,
+    headline,
+    page,
+    subscript,
+)
 from msfp_gen.results.characterise import Characterisation
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.friction_parameters import proportional, select_friction

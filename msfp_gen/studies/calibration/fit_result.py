@@ -13,8 +13,20 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import make_folder, write_bytes
 from msfp_gen.common.tables import Table, write_columns
-from msfp_gen.figures import COLOURS, INK, displacement, displacement_label, engineering, force, page
-from msfp_gen.figures.style import FAINT, HAIR, THIN, headline, plain
+from msfp_gen.figures.style import (
+    COLOURS,
+    FAINT,
+    HAIR,
+    INK,
+    THIN,
+    displacement,
+    displacement_label,
+    engineering,
+    force,
+    headline,
+    page,
+    plain,
+)
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.studies.calibration.measurement import FittedTest
 

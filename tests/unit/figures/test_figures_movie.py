@@ -11,7 +11,8 @@ from support import preset_run
 from support.films import drawn_twice
 
 from msfp_gen.common.errors import InputError
-from msfp_gen.figures import animate, movie, page
+from msfp_gen.figures import animate, movie
+from msfp_gen.figures.style import page
 
 SHORT = {"seconds": 0.5, "frames_per_second": 6}
 

@@ -11,9 +11,10 @@ from support import preset_run
 from support.synthetic import loops
 
 from msfp_gen.common.errors import InputError
-from msfp_gen.figures import FIGURES, engineering, plot_energy, plot_force_path, plot_section, plot_stages
+from msfp_gen.figures import FIGURES, plot_energy, plot_force_path, plot_section, plot_stages
 from msfp_gen.figures.bearing import eccentricity
 from msfp_gen.figures.section import peak_time
+from msfp_gen.figures.style import engineering
 from msfp_gen.results.geometry import azimuth_of, friction_circles, sections
 from msfp_gen.results.history import ENERGY
 from msfp_gen.results.joining import at_times
