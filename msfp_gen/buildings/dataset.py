@@ -290,7 +290,7 @@ def edition() -> str:
 def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> dict[str, Any]:
     """Scene, rows, extremes, counters and notes of a file, as `ResultFiles.fields_in`."""
     scene = _scene(root, about, arrays)
-    sizes = SIZES | {dim: len(labels) for dim, labels in labels_of(scene).items()} | {"time": root.length("time")}
+    sizes = SIZES | {dim: len(labels) for dim, labels in labels_of(scene).items()} | {"time": root.rows("time")}
     surfaces = np.array([bearing.layout.surfaces for bearing in scene.every_bearing])
     missing = np.arange(sizes["surface"]) >= surfaces[:, None]
     counters: dict[str, Any] = without(COUNTER, about)

@@ -124,7 +124,12 @@ class BuildingScene:
             with errors_at("bearing", f"scene.bearings[{index}].bearing"):
                 check_seats(mount.bearing, mount.interface, mount.effects)
         check_fields(self, "scene")
-        self._check_gravity()
+        for index, mount in enumerate(self.bearings):
+            if mount.bearing.gravity != self.gravity:
+                raise InputError(
+                    f"scene.bearings[{index}].bearing.gravity = {mount.bearing.gravity}: that of the first is "
+                    f"{self.gravity}; give all the same [m/s^2]"
+                )
         self._check_places()
         self._check_motion()
         if self.solver.method == "dopri5":
@@ -317,14 +322,6 @@ class BuildingScene:
                 raise InputError(
                     f"scene.bearings[{second}].position = ({at}): scene.bearings[{near[0]}] is there too; give places "
                     "apart [m]"
-                )
-
-    def _check_gravity(self) -> None:
-        for index, mount in enumerate(self.bearings):
-            if mount.bearing.gravity != self.gravity:
-                raise InputError(
-                    f"scene.bearings[{index}].bearing.gravity = {mount.bearing.gravity}: that of the first is "
-                    f"{self.gravity}; give all the same [m/s^2]"
                 )
 
     def _check_motion(self) -> None:

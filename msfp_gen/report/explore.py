@@ -17,7 +17,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import CompileError, InputError
-from msfp_gen.figures.style import COLOURS
+from msfp_gen.figures.style import colour
 from msfp_gen.jit.build import BuildInfo, runtime_sources
 from msfp_gen.jit.compiler import FLAGS, Log, Step, zig_program
 from msfp_gen.model.model import Model
@@ -90,7 +90,7 @@ def problem_of(scene: Scene, title: str) -> Problem:
         "heights": [float(height) for height in fixed.bearing.arrays()["height"]],
         "signs": list(fixed.bearing.layout.signs),
         "outlines": [pieces(fixed.bearing, body) for body in range(fixed.bearing.layout.n)],
-        "colours": [COLOURS[index % len(COLOURS)] for index in range(fixed.bearing.layout.surfaces)],
+        "colours": [colour(surface) for surface in range(1, fixed.bearing.layout.surfaces + 1)],
         "axialLoad": fixed.top.axial_load if isinstance(fixed.top, RigTop) and fixed.load is None else None,
         "kind": str(fixed.motion.metadata.get("kind", "")) if hasattr(fixed.motion, "metadata") else "",
         "record": fixed.motion.sampled,

@@ -20,7 +20,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.common.version import __version__
 from msfp_gen.figures.building import DEPTH, height_of, level_of, plan_of, size_of
-from msfp_gen.figures.style import COLOURS
+from msfp_gen.figures.style import colour
 from msfp_gen.results.geometry import POINTS, Poses, friction_circles, outline, poses
 from msfp_gen.results.history import History
 from msfp_gen.results.joining import at_times
@@ -66,11 +66,15 @@ def view(result: Result, count: int = FRAMES) -> dict[str, Any]:
         "state": states(history),
         "circle": friction_circles(shown),
     }
+    largest = frames["circle"].max(axis=0)
     return {
         "peak": history.peak_row,
         "azimuth": main_direction(history.displacement[:, :2]),
         "states": STATES,
-        "surfaces": _surfaces(bearing, frames["circle"]),
+        "surfaces": [
+            {"capacity": surface.capacity, "circle": float(circle), "colour": colour(number)}  # largest circle [m]
+            for number, (surface, circle) in enumerate(zip(bearing.surfaces, largest, strict=True), start=1)
+        ],
         "bodies": [pieces(bearing, body) for body in range(bearing.layout.n)],
         "events": [
             {"time": event.time, "surface": event.surface, "kind": event.kind.replace("_", " ")}
@@ -156,14 +160,6 @@ def packed(values: Array) -> dict[str, Any]:
     """An array as little-endian float32 in base64, with its shape."""
     data = base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
     return {"shape": list(values.shape), "data": data}
-
-
-def _surfaces(bearing: Bearing, radii: Array) -> list[dict[str, Any]]:
-    """Capacity [m], largest radius of the friction circle [m] and colour of every surface."""
-    return [
-        {"capacity": surface.capacity, "circle": float(circle), "colour": COLOURS[index % len(COLOURS)]}
-        for index, (surface, circle) in enumerate(zip(bearing.surfaces, radii.max(axis=0), strict=True))
-    ]
 
 
 def scale_of(result: BuildingResult) -> int:

@@ -24,7 +24,7 @@ from msfp_gen.results.note import by_importance
 from msfp_gen.results.result import AnyResult, Result
 from msfp_gen.results.run_data import BearingData
 from msfp_gen.scene.bearing import Bearing
-from msfp_gen.studies.calibration import Estimate, Fit, FittedTest
+from msfp_gen.studies.calibration import Fit, FittedTest
 from msfp_gen.studies.calibration.fit_result import correlation_table, estimate_table, residual_table
 from msfp_gen.studies.calibration.intervals import lag_one
 
@@ -382,21 +382,16 @@ def _count(number: int, noun: str) -> str:
 def _values(fit: Fit) -> Table:
     """The table of estimates with the change from the start and the bounds."""
     table = estimate_table(fit)
-    pairs = zip(table.rows, fit.estimates, strict=True)
-    rows = [(*row, _run_error(estimate), _change(estimate), _bounds(estimate)) for row, estimate in pairs]
+    rows = [
+        (
+            *row,
+            f"{estimate.run_error:.2g}" if np.isfinite(estimate.run_error) else "not measured",
+            f"{100 * (estimate.value / estimate.start - 1):+.1f} %" if estimate.start else "-",
+            "{:.4g} to {:.4g}".format(*estimate.bounds) if np.isfinite(estimate.bounds).all() else "none",
+        )
+        for row, estimate in zip(table.rows, fit.estimates, strict=True)
+    ]
     return Table(table.title, (*table.columns, "error of the runs", "change", "bounds"), rows)
-
-
-def _run_error(estimate: Estimate) -> str:
-    return f"{estimate.run_error:.2g}" if np.isfinite(estimate.run_error) else "not measured"
-
-
-def _change(estimate: Estimate) -> str:
-    return f"{100 * (estimate.value / estimate.start - 1):+.1f} %" if estimate.start else "-"
-
-
-def _bounds(estimate: Estimate) -> str:
-    return "{:.4g} to {:.4g}".format(*estimate.bounds) if np.isfinite(estimate.bounds).all() else "none"
 
 
 def _tests(fit: Fit) -> Table:

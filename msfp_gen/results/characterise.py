@@ -320,8 +320,8 @@ def _joined(surfaces: tuple[int, ...]) -> str:
     return "+".join(map(str, surfaces)) or "none"
 
 
-def _number(value: float | None, scale: float = 1.0, unit: str = "") -> str:
-    return "-" if value is None else f"{value * scale:.4g}{unit}"
+def _number(value: float | None, scale: float) -> str:
+    return "-" if value is None else f"{value * scale:.4g}"
 
 
 NOT_RECORDED = (

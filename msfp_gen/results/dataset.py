@@ -137,7 +137,7 @@ def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) ->
     scene = _scene(root, about, arrays)
     surfaces = scene.bearing.layout.surfaces
     sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}
-    sizes |= {"time": root.length("time"), "event": root.length("event_time")}
+    sizes |= {"time": root.rows("time"), "event": root.rows("event_time")}
     variables = {name: v for name, v in VARIABLES.items() if v.field not in OPTIONAL or name in root}
     read = stored_fields(root, variables, sizes, arrays)
     energy = {name: read.pop(f"energy_{name}") for name in ENERGY}

@@ -135,10 +135,19 @@ class ResultFiles:
 
         Raises InputError where the suffix is not .nc or the folder does not exist.
         """
+        import h5netcdf
+        from xarray.backends import H5NetCDFStore
+
         path = check_output(path, DATASET_SUFFIXES)
         derived, groups = self.derived_and_groups()
         value = digest_of_dataset(self.dataset.drop_vars(derived, errors="ignore"), groups)
-        write_groups(path, self.dataset.assign_attrs({DIGEST: value}), groups)
+        dataset = self.dataset.assign_attrs({DIGEST: value})
+        # The file is made in memory, because HDF5 crashes instead of raising an error when the disk is full.
+        content = BytesIO()
+        with h5netcdf.File(content, "w") as file:
+            dataset.dump_to_store(H5NetCDFStore(file), encoding=_encoding(dataset))
+            dump_groups(file, groups)
+        write_bytes(path, [content.getbuffer(), seal(sha256(content.getbuffer()))])
         return path
 
     def to_csv(self, path: str | Path, columns: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
@@ -336,18 +345,12 @@ def attributes_of(
     }
 
 
-def write_groups(path: Path, dataset: xr.Dataset, groups: Mapping[str, xr.Dataset]) -> None:
-    """Write a dataset, and others as groups, as one sealed netCDF-4 file, completely or not at all."""
-    import h5netcdf
+def dump_groups(file: Any, groups: Mapping[str, xr.Dataset]) -> None:
+    """Write datasets as groups of an open file."""
     from xarray.backends import H5NetCDFStore
 
-    # The file is made in memory, because HDF5 crashes instead of raising an error when the disk is full.
-    content = BytesIO()
-    with h5netcdf.File(content, "w") as file:
-        dataset.dump_to_store(H5NetCDFStore(file), encoding=_encoding(dataset))
-        for name, group in groups.items():
-            group.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(group))
-    write_bytes(path, [content.getbuffer(), seal(sha256(content.getbuffer()))])
+    for name, group in groups.items():
+        group.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(group))
 
 
 def _encoding(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
@@ -376,17 +379,7 @@ def digest_of_dataset(
     for name, group in groups.items():
         arrays |= {f"{name}/{key}": variable.to_numpy() for key, variable in group.data_vars.items()}
         about |= {f"{name}/{key}": value for key, value in group.attrs.items()}
-    return digest_of(about, arrays)
-
-
-def digest_of(attributes: Mapping[str, Attribute], arrays: Arrays) -> str:
-    """The digest of a file with these attributes and arrays; those that are not read do not matter.
-
-    arrays: ndarrays, or the `ArrayDigest` of those that came in blocks.
-    """
-    read = {name: value for name, value in attributes.items() if _is_read(name)}
-    known = {name: v if isinstance(v, ArrayDigest) else ArrayDigest.of(v) for name, v in arrays.items()}
-    return digest(read, known)
+    return digest({name: value for name, value in about.items() if _is_read(name)}, arrays)
 
 
 def _is_read(name: str) -> bool:
@@ -434,7 +427,7 @@ def _read(root: StoredGroup, about: dict[str, Attribute], kind: type[F]) -> F:
     fields = kind.storage.fields_in(root, about, arrays)
     if not str(about["status"]).isidentifier():
         raise ValueError(f"status = {about['status']!r} is no word")
-    if written is not None and written != digest_of(about, arrays):  # another program may have left it out
+    if written is not None and written != digest(about, arrays):  # another program may have left it out
         raise InputError("a value was changed after this file was written; run the scene again")
     for name, value in without(COUNTER, about).items():
         if not isinstance(value, float if name == "wall_time" else int) or not 0 <= value < math.inf:
@@ -465,8 +458,8 @@ def motion_in(root: StoredGroup, name: str = "motion") -> tuple[Motion, Arrays, 
     from msfp_gen.scene.file.stored_motion import from_pieces
 
     group = root.group(name)
-    count = group.length("knots")
-    shapes = {"knots": (count,), "coefficients": (max(0, count - 1), 6, 6), "jumps": (group.length("jumps"),)}
+    count = group.rows("knots")
+    shapes = {"knots": (count,), "coefficients": (max(0, count - 1), 6, 6), "jumps": (group.rows("jumps"),)}
     pieces = {key: group.array(key, shape, compressed=key != "knots") for key, shape in shapes.items()}
     about = group.attributes(lambda key: key in ("name", "metadata", "max_step"))
     motion = from_pieces(pieces, about)

@@ -168,14 +168,10 @@ def _of_groups(block: History, group: int) -> Any:
 def _of_extremes(rows: History) -> Any:
     """Rows with the least and the largest of each number, the first of equal ones, and the ends."""
     chosen = [0, len(rows.time) - 1]
-    numbers = [_columns(values) for name, values in rows.arrays().items() if name != "time"]
-    for column in np.concatenate([*numbers, *(_columns(values) for values in rows.energy.values())], axis=1).T:
+    numbers = [values for name, values in rows.arrays().items() if name != "time"] + list(rows.energy.values())
+    for column in np.concatenate([values.reshape(len(values), -1) for values in numbers], axis=1).T:
         chosen += [int(column.argmin()), int(column.argmax())]
     return np.unique([*chosen, int(rows.horizontal.argmax()), first_peak(rows.horizontal)])
-
-
-def _columns(values: Array) -> Array:
-    return values.reshape(len(values), -1)
 
 
 R = TypeVar("R", bound=ResultFiles)

@@ -58,13 +58,6 @@ class StoredGroup:
         """The attributes with names that are `wanted`, as texts and numbers."""
         return {name: self._attribute(name) for name in self._group.attrs if wanted(name)}
 
-    def length(self, name: str) -> int:
-        """Number of entries of a list of numbers."""
-        shape = self._dataset(name).shape
-        if shape is None or len(shape) != 1:
-            raise ValueError(f"{name} is no list of numbers")
-        return int(shape[0])
-
     def rows(self, name: str) -> int:
         """Number of rows of an array."""
         shape = self._dataset(name).shape
@@ -208,11 +201,15 @@ class ArrayDigest:
         return f"{self._kind}{self._shape}{self._total.hexdigest()}"
 
 
-def digest(attributes: Mapping[str, Attribute], arrays: Mapping[str, ArrayDigest]) -> str:
-    """The sha256 of attributes and arrays, with their names; it detects damage, not forgery."""
+def digest(attributes: Mapping[str, Attribute], arrays: Mapping[str, Any]) -> str:
+    """The sha256 of attributes and arrays, with their names; it detects damage, not forgery.
+
+    arrays: ndarrays, or the `ArrayDigest` of those that came in blocks.
+    """
     total = hashlib.sha256()
     for name, value in sorted(attributes.items()):
         total.update(f"{name}={value!r}\n".encode())
     for name, values in sorted(arrays.items()):
-        total.update(f"{name}{values.text}\n".encode())
+        known = values if isinstance(values, ArrayDigest) else ArrayDigest.of(values)
+        total.update(f"{name}{known.text}\n".encode())
     return total.hexdigest()

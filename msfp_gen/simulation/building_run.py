@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import reduce
 from typing import Any, NamedTuple, Protocol, Self
@@ -321,21 +321,14 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
     return BuildingRun(run, scene, members, grounds, hashlib.sha256(" ".join(keys).encode()).hexdigest())
 
 
-def columns(run: BuildingRun) -> Iterator[tuple[str, tuple[int, ...]]]:
-    """Parts of a row in order: names and shapes."""
-    n = len(run.scene.building.mass)
-    yield "time", ()
-    yield from ((name, (n,)) for name in MOTIONS)
-    yield "ground", (len(run.grounds), 3, 3)
-    yield from ((name, ()) for name in ENERGIES)
-    for index, member in enumerate(run.members):
-        yield f"wrench {index}", (2, 6)
-        yield from ((f"{name} {index}", shape) for name, shape in member.shapes)
-
-
 def unpacked(run: BuildingRun) -> dict[str, Array]:
     """The rows until now by name, those of bearings with their index; each of shape (k, ...) [SI]."""
-    rows: dict[str, Array] = parts(run.run.rows, columns(run))
+    n = len(run.scene.building.mass)
+    shapes = [("time", ()), *((name, (n,)) for name in MOTIONS), ("ground", (len(run.grounds), 3, 3))]
+    shapes += [(name, ()) for name in ENERGIES]
+    for index, member in enumerate(run.members):
+        shapes += [(f"wrench {index}", (2, 6)), *((f"{name} {index}", shape) for name, shape in member.shapes)]
+    rows: dict[str, Array] = parts(run.run.rows, shapes)
     for index in {change.bearing for change in run.changes}:  # the integrals of their models begin anew
         work = rows[f"work {index}"]
         rows[f"work {index}"] = work + earlier_work(run.changes, index, work.shape)

@@ -24,8 +24,8 @@ from msfp_gen.common.output import replacing
 from msfp_gen.model.compiled import Run
 from msfp_gen.model.model import Model
 from msfp_gen.model.plane import out_of_plane
-from msfp_gen.results.dataset import ROWS, rows_of, to_dataset
-from msfp_gen.results.files import DIGEST, digest_of_dataset
+from msfp_gen.results.dataset import ROWS, groups_of, rows_of, to_dataset
+from msfp_gen.results.files import DIGEST, digest_of_dataset, dump_groups
 from msfp_gen.results.history import Event, Extremes, History
 from msfp_gen.results.joining import BLOCK, Joint, blocks, concatenated, taken, thinned
 from msfp_gen.results.result import Result
@@ -314,10 +314,8 @@ def write_blocks(result: RunData, path: Path, count: int, blocks: Iterable[Histo
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
-    from msfp_gen.scene.file.stored_motion import COMPRESSED, GROUP, needs_pieces, to_pieces
-
     first = to_dataset(replace(result, history=taken(result.history, slice(0, 1))))
-    pieces = to_pieces(result.scene.motion) if needs_pieces(result.scene) else None
+    groups = groups_of(result)
     along_time = {str(name): v for name, v in first.variables.items() if "time" in v.dims}
     encoding: dict[str, dict[str, Any]] = {
         name: {"chunksizes": (min(count, BLOCK), *variable.shape[1:])} for name, variable in along_time.items()
@@ -327,11 +325,10 @@ def write_blocks(result: RunData, path: Path, count: int, blocks: Iterable[Histo
     with replacing(path) as temporary, _Disk(temporary) as disk:
         with h5netcdf.File(disk, "w") as file:
             first.dump_to_store(H5NetCDFStore(file), encoding=encoding, unlimited_dims=["time"])
-            if pieces is not None:
-                pieces.dump_to_store(H5NetCDFStore(file, group=GROUP), encoding=COMPRESSED)
+            dump_groups(file, groups)
             file.resize_dimension("time", count)
             digests = _write_rows(file, disk, blocks)
-            file.attrs[DIGEST] = digest_of_dataset(first, {} if pieces is None else {GROUP: pieces}, digests)
+            file.attrs[DIGEST] = digest_of_dataset(first, groups, digests)
         disk.finish()
 
 
