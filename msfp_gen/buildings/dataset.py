@@ -62,6 +62,7 @@ def scene_text(scene: BuildingScene) -> str:
             "grounds": len(scene.grounds[0]),
             "solver": plain_table(scene.solver),
             "limits": None if scene.limits is None else plain_table(scene.limits),
+            "fidelity": None if scene.fidelity == "exact" else scene.fidelity,
             "node": [{"name": n.name, "carries": n.carries} for n in building.nodes],
             "column": [{"name": column.name} for column in building.columns],
             "bearing": [
@@ -114,7 +115,8 @@ def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -
     solver = Solver(**{name: value for name, value in table.get("solver", {}).items() if name in known})
     name, duration, step = str(table.get("name", "")), table.get("duration"), table.get("output_step")
     limits = Limits(**table["limits"]) if "limits" in table else None
-    return BuildingScene(building, bearings, motions[0], solver, duration, name, step, limits)
+    fidelity = table.get("fidelity", "exact")
+    return BuildingScene(building, bearings, motions[0], solver, duration, name, step, limits, fidelity)
 
 
 EXTREMES = "extremes"  # group
