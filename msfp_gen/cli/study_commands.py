@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
@@ -106,9 +105,8 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Run what is missing of a study, or estimate a statistic of it. Ctrl-C at any time: the same command continues."""
+    from msfp_gen.studies import run as module
     from msfp_gen.studies.definition import example_text, load_study
-    from msfp_gen.studies.run import parsed_shard
-    from msfp_gen.studies.run import study as run_study
 
     if example:
         say(example_text().rstrip("\n"))
@@ -117,7 +115,7 @@ def run(
         raise InputError("study: no FILE is given; `msfp-gen study --example` prints one to start from")
     if output is None:
         raise InputError("--output is missing: give the folder of the study, such as -o out")
-    part = (1, 1) if shard is None else parsed_shard(shard)
+    part = (1, 1) if shard is None else module.parsed_shard(shard)
     with Progress("records") as progress:
         definition = load_study(source, progress)
     question = {
@@ -133,7 +131,7 @@ def run(
         raise InputError("--plot: it draws an estimate; give --estimate too")
     try:
         with Progress(f"{definition.runs} runs") as progress:
-            done = run_study(
+            done = module.study(
                 definition, output, workers=workers, threads=threads, dask=dask, mpi=mpi, shard=part, progress=progress
             )
     except KeyboardInterrupt:
@@ -166,7 +164,7 @@ def _estimate(
 def _report(done: Outcome, output: Path, as_json: bool, judged: bool) -> None:
     """Print how far the study is; `judged`: and how many of its runs exceeded limits of the device."""
     if as_json:
-        say(json.dumps(done._asdict(), indent=2))
+        answer(done._asdict(), [], as_json)
         return
     before = f", {done.before} of them before" if done.before else ""
     say(f"{done.before + done.done} of {done.runs} runs are in {output}{before}; {done.failed} failed")
@@ -203,15 +201,15 @@ def ida(
     as_json: AsJson = False,
 ) -> None:
     """Curves of demand over intensity, one for each record, and their fractiles."""
-    from msfp_gen.studies.assessment.ida import ida as analyse
-    from msfp_gen.studies.assessment.ida import ida_table, plot_ida
+    from msfp_gen.studies.assessment import ida as module
     from msfp_gen.studies.assessment.rows import chosen_rows, read_study
 
     _check(plot, output)
-    result = analyse(chosen_rows(read_study(folder), where or ()), measure, demand, fractiles)
+    result = module.ida(chosen_rows(read_study(folder), where or ()), measure, demand, fractiles)
     plain = result.fractiles.replace(float("inf"), None).to_dict("records")
     content = {"measure": measure, "demand": demand, "unit": result.unit, "fractiles": plain}
-    _finish(content, ida_table(result), result.fractiles, partial(plot_ida, result), (plot, output, as_json))
+    draw = partial(module.plot_ida, result)
+    _finish(content, module.ida_table(result), result.fractiles, draw, (plot, output, as_json))
 
 
 @group.command(
@@ -246,17 +244,16 @@ def fragility(
     as_json: AsJson = False,
 ) -> None:
     """Lognormal fragility curves by maximum likelihood, with confidence bands, one for each threshold."""
-    from msfp_gen.studies.assessment.fragility import fragility as analyse
-    from msfp_gen.studies.assessment.fragility import fragility_frame, fragility_table, plot_fragility
+    from msfp_gen.studies.assessment import fragility as module
     from msfp_gen.studies.assessment.rows import chosen_rows, read_study
 
     _check(plot, output)
     rows = chosen_rows(read_study(folder), where or ())
-    result = analyse(
+    result = module.fragility(
         rows, measure, demand, thresholds, early=early, level=level, bootstrap=bootstrap, cluster=cluster, by=by
     )  # fmt: skip
-    table, frame = fragility_table(result), fragility_frame(result)
-    _finish(result.as_dict(), table, frame, partial(plot_fragility, result), (plot, output, as_json))
+    table, frame, draw = module.fragility_table(result), module.fragility_frame(result), module.plot_fragility
+    _finish(result.as_dict(), table, frame, partial(draw, result), (plot, output, as_json))
 
 
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study tornado out --quantity peak_displacement --plot tornado.png")
@@ -269,13 +266,12 @@ def tornado(
     as_json: AsJson = False,
 ) -> None:
     """The change of a quantity with each random axis alone; for `sampling.method = "one-at-a-time"`."""
-    from msfp_gen.studies.assessment.sensitivity import plot_tornado, tornado_table
-    from msfp_gen.studies.assessment.sensitivity import tornado as analyse
+    from msfp_gen.studies.assessment import sensitivity as module
 
     _check(plot, output)
-    result = analyse(folder, quantity, statistic)
-    rows = [vars(bar) for bar in result.bars]
-    _finish(asdict(result), tornado_table(result), rows, partial(plot_tornado, result), (plot, output, as_json))
+    result = module.tornado(folder, quantity, statistic)
+    table, rows, draw = module.tornado_table(result), [vars(bar) for bar in result.bars], module.plot_tornado
+    _finish(asdict(result), table, rows, partial(draw, result), (plot, output, as_json))
 
 
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study sobol out --quantity peak_displacement --plot sobol.png")
@@ -289,14 +285,15 @@ def sobol(
     as_json: AsJson = False,
 ) -> None:
     """First-order and total Sobol' indices of a quantity; for `sampling.method = "sobol-indices"`, with SALib."""
-    from msfp_gen.studies.assessment.sensitivity import plot_sobol, sobol_table
-    from msfp_gen.studies.assessment.sensitivity import sobol as analyse
+    from msfp_gen.studies.assessment import sensitivity as module
 
     _check(plot, output)
-    result = analyse(folder, quantity, statistic, level)
+    result = module.sobol(folder, quantity, statistic, level)
     columns = ("axes", "first", "first_interval", "total", "total_interval")
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*(getattr(result, c) for c in columns), strict=True)]
-    _finish(asdict(result), sobol_table(result), rows, partial(plot_sobol, result), (plot, output, as_json))
+    _finish(
+        asdict(result), module.sobol_table(result), rows, partial(module.plot_sobol, result), (plot, output, as_json)
+    )
 
 
 def _check(plot: Path | None, output: Path | None) -> None:
@@ -358,8 +355,7 @@ def pareto(
     from msfp_gen.studies.assessment.pareto import DESIGNS, Goals, front_table, plot_pareto
     from msfp_gen.studies.assessment.pareto import pareto as search
 
-    if plot is not None:
-        check_output(plot, FIGURE_SUFFIXES, "--plot")
+    _check(plot, None)
     goals = Goals(tuple(minimise or ()), tuple(maximise or ()), dict(map(_limit, at_most or ())), statistic)
     with Progress(f"{generations} generations") as progress:
         front = search(

@@ -107,7 +107,7 @@ def run_on(
 ) -> Outcome:
     """Compute what is missing of a study on a pool. Arguments and errors are those of `study`."""
     make_folder(folder, "output")
-    chunks = chunks_in(study, folder)
+    chunks = Chunks(study, folder)
     chunks.open()
     study, present = chunks.study, set(parts_in(chunks.folder))
     numbers = range(shard[0] - 1, study.chunks, shard[1])
@@ -236,11 +236,13 @@ def _part(order: Order, rows: list[dict[str, Any]], failed: int, more: dict[str,
 
 
 class Chunks:
-    """The chunks of a study and their parts in a folder."""
+    """The chunks of a study in a folder: of the size that they have there, unless the study file gives one."""
 
     def __init__(self, study: Study, folder: Path) -> None:
-        self.study = study
-        self.folder = folder
+        size = _about(folder).get("chunk")
+        if study.given_chunk is None and isinstance(size, int) and size > 0 and parts_in(folder):
+            study = replace(study, given_chunk=size)
+        self.study, self.folder = study, folder
 
     def path(self, task: Task) -> Path:
         """The file of the part of a chunk."""
@@ -352,14 +354,6 @@ class Chunks:
             ),
             "its files or the equations have changed",
         )
-
-
-def chunks_in(study: Study, folder: Path) -> Chunks:
-    """The chunks of a study in a folder: of the size that they have there, unless the study file gives one."""
-    size = _about(folder).get("chunk")
-    if study.given_chunk is None and isinstance(size, int) and size > 0 and parts_in(folder):
-        study = replace(study, given_chunk=size)
-    return Chunks(study, folder)
 
 
 def parts_in(folder: Path) -> dict[str, int]:

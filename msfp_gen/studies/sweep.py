@@ -17,7 +17,7 @@ from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.scene.file.changes import keys_of
 from msfp_gen.scene.file.loader import scene_table
 from msfp_gen.studies.axes import Axis, Recipe, SceneFactory, located, motion_of
-from msfp_gen.studies.columns import Counts, Source, catalogue, plain_cell, value_at
+from msfp_gen.studies.columns import Counts, catalogue, plain_cell, value_at
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult
@@ -132,33 +132,29 @@ def row_of(number: int, variation: Variation, result: Result | BuildingResult | 
 
 
 def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> Path:
-    """Write the rows, sorted by their number, as CSV or Parquet; arguments and errors are those of `write_columns`."""
-    return write_columns(path, _columns(sorted(rows)), name)
+    """Write the rows, sorted by their number, as CSV or Parquet; arguments and errors are those of `write_columns`.
 
-
-def _columns(rows: Sequence[Row]) -> dict[tuple[str, str], list[Any]]:
-    """(name, unit) -> values, None where a run has none."""
+    The columns are the varied fields and the quantities of the summaries of bearings and of buildings.
+    """
+    rows = sorted(rows)
     varied = dict.fromkeys(path for row in rows for path in row.varied)
     table: dict[tuple[str, str], list[Any]] = {
         ("number", ""): [row.number for row in rows],
         ("scene", ""): [row.source for row in rows],
         **{(path, ""): [plain_cell(row.varied.get(path)) for row in rows] for path in varied},
     }
-    for name, source in _sources(rows).items():
-        values = [plain_cell(source.value(row.summary, None)) for row in rows]
-        if source.place is None or any(value is not None for value in values):
-            table[name, source.quantity.unit] = values
-    return {**table, ("file", ""): [row.file for row in rows]}
-
-
-def _sources(rows: Sequence[Row]) -> dict[str, Source]:
-    """The quantities of the summaries of bearings and of buildings, where there are some."""
     counts: dict[bool, Counts] = {}
     for row in rows:
         of_building = row.counts.bearings > 0
         counts[of_building] = counts.get(of_building, Counts()).or_more(row.counts)
     sources = {name: source for _, count in sorted(counts.items()) for name, source in catalogue(count).items()}
-    return {name: source for name, source in sources.items() if not source.quantity.characterised}
+    for column, source in sources.items():
+        if source.quantity.characterised:
+            continue
+        values = [plain_cell(source.value(row.summary, None)) for row in rows]
+        if source.place is None or any(value is not None for value in values):
+            table[column, source.quantity.unit] = values
+    return write_columns(path, {**table, ("file", ""): [row.file for row in rows]}, name)
 
 
 def sweep_table(rows: Sequence[Row]) -> Table:

@@ -123,8 +123,21 @@ class Within:
     @property
     def tables(self) -> list[Table]:
         """Tables for the console; with attempts and reasons if an explanation was requested."""
-        chosen = self.chosen
-        estimate = f"{share(chosen.estimate)}: {_parts(chosen)}"
+        chosen, step, errors = self.chosen, self.next_step, self.chosen.errors
+        parts = (
+            "not estimated"
+            if errors is None
+            else (
+                f"force {share(errors.force_rms)} RMS, {share(errors.force_peak)} at its peak; sliding "
+                f"{share(errors.sliding_rms)} RMS, {share(errors.sliding_peak)} at its peak"
+            )
+        )
+        following = "not run in the time given"
+        if step is not None:
+            smaller = (step.estimate or 1.0) < (chosen.estimate or 0.0)
+            error = f"about {share(step.estimate)}" if smaller else "no smaller estimate"
+            following = f"rtol {step.rtol:g}: {error} in {_seconds(step.seconds)}"
+        estimate = f"{share(chosen.estimate)}: {parts}"
         known = self.estimate is not None
         cost = (
             f"{_seconds(chosen.seconds)}, {chosen.newton} Newton iterations; with the search {_seconds(self.seconds)}"
@@ -135,7 +148,7 @@ class Within:
             *([("not in the estimate", self.left_out)] if self.left_out else []),
             ("settings", f"{chosen.method}, rtol {chosen.rtol:g}"),
             ("cost of this run", cost),
-            ("next tighter tolerance", _next(self.next_step, chosen)),
+            ("next tighter tolerance", following),
         ]
         tables = [Table("accuracy, relative to peaks", (), rows)]
         if not self.explained:
@@ -390,24 +403,6 @@ class _Search:
 def share(value: float | None) -> str:
     """`value` as a percentage with two digits."""
     return "not known" if value is None else f"{100 * value:.2g} %"
-
-
-def _parts(attempt: Attempt) -> str:
-    if attempt.errors is None:
-        return "not estimated"
-    differences = attempt.errors
-    return (
-        f"force {share(differences.force_rms)} RMS, {share(differences.force_peak)} at its peak; sliding "
-        f"{share(differences.sliding_rms)} RMS, {share(differences.sliding_peak)} at its peak"
-    )
-
-
-def _next(step: Attempt | None, chosen: Attempt) -> str:
-    if step is None:
-        return "not run in the time given"
-    smaller = (step.estimate or 1.0) < (chosen.estimate or 0.0)
-    error = f"about {share(step.estimate)}" if smaller else "no smaller estimate"
-    return f"rtol {step.rtol:g}: {error} in {_seconds(step.seconds)}"
 
 
 def _seconds(value: float) -> str:

@@ -57,10 +57,13 @@ def run_library(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
     from scipy import integrate  # imported before timing starts
 
     begin, work, times = time.perf_counter(), Work(), comparison_times(scene.end)
-    y = _initial_state(scene, ode)
+    y, start = ode.y0, scene.initial_state
+    if start is not None:
+        y = np.concatenate([np.ravel(part) for part in (start.q, start.v, start.h)]).astype(float)
     states, status, message = [y[None]], OK, ""
+    jumps = [float(t) for t in scene.motion.jumps if 0 < t < scene.end]  # of the base acceleration
     try:
-        for first, last in _smooth_intervals(scene):
+        for first, last in pairwise([0.0, *jumps, scene.end]):
             solver = _solver(getattr(integrate, name), scene, ode, work, first, last, y, rtol)
             while solver.status == "running":
                 states.append(_advance(solver, times, work))
@@ -79,19 +82,6 @@ def run_library(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
         status, message = "failed", f"no acceleration at t = {reached:.6g} s"
     cost = work.newton, work.evaluations, work.steps
     return Trial(name, rtol, status, seconds, reached, scene.end, *cost, force, sliding, message)
-
-
-def _initial_state(scene: Scene, ode: Ode) -> Array:
-    if scene.initial_state is None:
-        return ode.y0
-    state = scene.initial_state
-    return np.concatenate([np.ravel(part) for part in (state.q, state.v, state.h)]).astype(float)
-
-
-def _smooth_intervals(scene: Scene) -> list[tuple[float, float]]:
-    """Intervals of the run [s] between jumps of the base acceleration."""
-    inside = [float(t) for t in scene.motion.jumps if 0 < t < scene.end]
-    return list(pairwise([0.0, *inside, scene.end]))
 
 
 def _solver(kind: Any, scene: Scene, ode: Ode, work: Work, first: float, last: float, y: Array, rtol: float) -> Any:

@@ -11,6 +11,7 @@ import os
 import platform
 import subprocess
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from math import isfinite, nan
 from pathlib import Path
@@ -310,48 +311,34 @@ HEADS = (
 
 def machine() -> dict[str, str]:
     """Name -> text: processor, cores, system, compiler, versions, commit of a checkout; without unknown ones."""
-    about = {
-        "processor": _processor(),
-        "cores": str(os.cpu_count()),
-        "system": f"{platform.system()} {platform.machine()}",
-        "compiler": _compiler(),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "msfp_gen": __version__,
-        "commit": _commit(),
-    }
-    return {name: value for name, value in about.items() if value}
-
-
-def _compiler() -> str:
     from msfp_gen.jit.compiler import FLAGS, find_compiler
 
     try:
-        return f"{find_compiler().version}, {' '.join(f for f in (*FLAGS['c'], *FLAGS['user']) if f[1:2] in 'Om')}"
+        flags = " ".join(flag for flag in (*FLAGS["c"], *FLAGS["user"]) if flag[1:2] in "Om")
+        compiler = f"{find_compiler().version}, {flags}"
     except CompileError:
-        return "none found"
-
-
-def _processor() -> str:
+        compiler = "none found"
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        processor = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
     except OSError:
-        return platform.processor()
-    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
-
-
-def _commit() -> str:
-    """Commit of the git checkout that contains the package; empty if there is none."""
-    root = Path(__file__).resolve().parents[3]
-    if not (root / ".git").exists():
-        return ""
-    try:
-        run = subprocess.run(
-            ["git", "-C", str(root), "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True
-        )
-    except (OSError, subprocess.CalledProcessError):
-        return ""
-    return run.stdout.strip()
+        processor = platform.processor()
+    root, commit = Path(__file__).resolve().parents[3], ""
+    if (root / ".git").exists():  # a checkout that contains the package
+        command = ["git", "-C", str(root), "rev-parse", "--short", "HEAD"]
+        with suppress(OSError, subprocess.CalledProcessError):
+            commit = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    about = {
+        "processor": processor,
+        "cores": str(os.cpu_count()),
+        "system": f"{platform.system()} {platform.machine()}",
+        "compiler": compiler,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "msfp_gen": __version__,
+        "commit": commit,
+    }
+    return {name: value for name, value in about.items() if value}
 
 
 def rows(study: Study) -> list[dict[str, Any]]:

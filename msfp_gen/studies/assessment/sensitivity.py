@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
 from msfp_gen.figures.style import COLOURS, INK, THIN, headline, page
@@ -84,32 +83,11 @@ class Sobol:
     samples: int
 
 
-@dataclass(frozen=True)
-class Samples:
-    """A quantity by sample.
+def by_sample(folder: str | Path, name: str, statistic: str, method: str) -> Any:
+    """The values of the random axes, and in the last column the statistic of a quantity over the runs of each sample.
 
-    Attributes:
-        name, unit: of the quantity.
-        statistic: over the runs of a sample.
-        axes: names of the random axes.
-        values: of the axes, ndarray, shape (samples, axes), [units of the axes].
-        reduced: the statistic of each sample, ndarray, shape (samples,), [its unit].
-        sampling: the table `[sampling]` of the study.
-    """
-
-    name: str
-    unit: str
-    statistic: str
-    axes: tuple[str, ...]
-    values: Array
-    reduced: Array
-    sampling: dict[str, Any]
-
-
-def by_sample(folder: str | Path, name: str, statistic: str, method: str) -> Samples:
-    """The quantity of a study by sample.
-
-    Raises InputError: another sampling method, runs that are missing or ended early, or a run without a value.
+    A DataFrame with a row for each sample; `attrs` has the `unit` of the quantity and the table `sampling` of the
+    study. Raises InputError: another sampling method, runs that are missing or ended early, or a run without a value.
     """
     if statistic not in STATISTICS:
         raise InputError(f"statistic = {statistic!r}: give one of {', '.join(STATISTICS)}")
@@ -128,9 +106,9 @@ def by_sample(folder: str | Path, name: str, statistic: str, method: str) -> Sam
         raise InputError(f"{name}: {int(np.isnan(y).sum())} runs have no value; give another quantity")
     count = table["about"]["samples"]
     reduced = STATISTICS[statistic](y.reshape(-1, count), axis=0)
-    return Samples(
-        name, unit_of(rows, name), statistic, axes, rows[list(axes)].to_numpy(dtype=float)[:count], reduced, sampling
-    )
+    samples = rows[list(axes)].astype(float).head(count).assign(**{name: reduced})
+    samples.attrs = {"unit": unit_of(rows, name), "sampling": sampling}
+    return samples
 
 
 def tornado(folder: str | Path, name: str, statistic: str = "median") -> Tornado:
@@ -140,14 +118,14 @@ def tornado(folder: str | Path, name: str, statistic: str = "median") -> Tornado
     several records: "median", "mean", "max" or "min". Raises InputError.
     """
     samples = by_sample(folder, name, statistic, "one-at-a-time")
-    low, high = samples.sampling.get("quantiles", Sampling("one-at-a-time").quantiles)
-    ends = [slice(1 + 2 * k, 3 + 2 * k) for k in range(len(samples.axes))]
+    low, high = samples.attrs["sampling"].get("quantiles", Sampling("one-at-a-time").quantiles)
+    values = samples.to_numpy()
     bars = [
-        Bar(axis, *samples.values[two, k].tolist(), *samples.reduced[two].tolist())
-        for k, (axis, two) in enumerate(zip(samples.axes, ends, strict=True))
+        Bar(axis, *values[1 + 2 * k : 3 + 2 * k, k].tolist(), *values[1 + 2 * k : 3 + 2 * k, -1].tolist())
+        for k, axis in enumerate(samples.columns[:-1])
     ]
     bars.sort(key=lambda bar: -bar.swing)
-    return Tornado(name, samples.unit, statistic, (low, high), float(samples.reduced[0]), tuple(bars))
+    return Tornado(name, samples.attrs["unit"], statistic, (low, high), float(values[0, -1]), tuple(bars))
 
 
 def sobol(folder: str | Path, name: str, statistic: str = "median", level: float = 0.95, seed: int = 0) -> Sobol:
@@ -161,19 +139,20 @@ def sobol(folder: str | Path, name: str, statistic: str = "median", level: float
 
     check_share("level", level)
     samples = by_sample(folder, name, statistic, "sobol-indices")
-    if not np.ptp(samples.reduced):
+    values = samples[name].to_numpy()
+    if not np.ptp(values):
         raise InputError(f"{name}: it has the same value in all samples; give another quantity")
-    count = len(samples.axes)
-    problem = {"num_vars": count, "names": list(samples.axes), "bounds": [[0.0, 1.0]] * count}
+    names = list(samples.columns[:-1])
+    problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
     indices = analysis.analyze(
-        problem, samples.reduced, calc_second_order=False, conf_level=level, print_to_console=False, seed=seed
+        problem, values, calc_second_order=False, conf_level=level, print_to_console=False, seed=seed
     )
     order = np.argsort(-np.asarray(indices["ST"]), kind="stable")
     first, total, of_first, of_total = (
-        tuple(indices[key][order].tolist()) for key in ("S1", "ST", "S1_conf", "ST_conf")
+        tuple(np.asarray(indices[key])[order].tolist()) for key in ("S1", "ST", "S1_conf", "ST_conf")
     )
-    axes, base = tuple(samples.axes[k] for k in order), len(samples.reduced) // (count + 2)
-    return Sobol(name, samples.unit, statistic, axes, first, total, of_first, of_total, level, base)
+    axes, base = tuple(names[k] for k in order), len(values) // (len(names) + 2)
+    return Sobol(name, samples.attrs["unit"], statistic, axes, first, total, of_first, of_total, level, base)
 
 
 def tornado_table(result: Tornado) -> Table:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,18 +39,6 @@ QUANTITIES = (
 OF_SURFACES = ("peak_sliding", "minimum_gap", "capacity_used")  # of one bearing only
 
 
-class _NoHistory:
-    """What a run without rows has of a history: nothing."""
-
-    def columns(self, _: object) -> dict[str, Any]:
-        """No columns."""
-        return {}
-
-    def arrays_of(self, _: object) -> dict[str, Any]:
-        """No arrays."""
-        return {}
-
-
 @dataclass(frozen=True)
 class BackboneRun:
     """A run of the cheapest level: its scene and the quantities of its summary; there are no rows.
@@ -62,9 +51,9 @@ class BackboneRun:
     message: str
     summary: dict[str, Any]
 
-    def storage(self) -> _NoHistory:
-        """Nothing is stored of a run without rows."""
-        return _NoHistory()
+    def storage(self) -> Any:
+        """Where the columns of a history are: a run without rows has none."""
+        return SimpleNamespace(columns=lambda _: {}, arrays_of=lambda _: {})
 
     def characterise(self) -> Any:
         """Raises InputError: there are no rows."""

@@ -259,7 +259,8 @@ def test_sobol_indices_are_those_of_ishigami(tmp_path: Path, monkeypatch: pytest
     shares = Sampling("sobol-indices", 4096, seed=1).shares(3)
     x = np.pi * (2 * shares - 1)
     y = np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
-    given = sensitivity.Samples("y", "", "median", ("a", "b", "c"), x, y, {})
+    given = pd.DataFrame(x, columns=["a", "b", "c"]).assign(y=y)
+    given.attrs["unit"] = ""
     monkeypatch.setattr(sensitivity, "by_sample", lambda *_: given)
     found = sobol(tmp_path, "y")
     assert found.axes == ("a", "b", "c") and found.samples == 4096
