@@ -26,7 +26,6 @@ from msfp_gen.cli.console import (
 from msfp_gen.common.errors import InputError, RunError
 
 if TYPE_CHECKING:
-    from msfp_gen.studies.bounding import Bounds
     from msfp_gen.studies.calibration import Measurement
 
 app = typer.Typer()
@@ -86,19 +85,21 @@ def bound(
         return
     from msfp_gen.buildings.file import load_scene
     from msfp_gen.common.output import make_folder
-    from msfp_gen.studies.bounding import bound as run_bounds
-    from msfp_gen.studies.bounding import bounded_scenes, load_factors
-    from msfp_gen.studies.bounding.runs import bounding_tables
+    from msfp_gen.studies.bounding import load_factors
+    from msfp_gen.studies.bounding import runs as module
 
     chosen, table = load_scene(scene), load_factors(factors)
-    bounded_scenes(chosen, table)  # refuses a table that does not fit the bearing before anything is written
+    module.bounded_scenes(chosen, table)  # refuses a table that does not fit the bearing before anything is written
     if output is not None:
         make_folder(output, "--output")
     build(chosen)
     with Progress("3 cases") as progress:
-        bounds = run_bounds(chosen, table, progress=progress)
-    answer(bounds.as_dict(), bounding_tables(bounds), as_json)
-    note_written(_save(bounds, output) if output is not None else [])
+        bounds = module.bound(chosen, table, progress=progress)
+    answer(bounds.as_dict(), module.bounding_tables(bounds), as_json)
+    if output is not None:
+        written = [c.result.to_netcdf(output / f"{c.name}.nc") for c in bounds.cases if c.result is not None]
+        module.plot_bounds(bounds, output / "bounds.png")
+        note_written([*written, module.write_quantities(bounds, output / "bounds.csv"), output / "bounds.png"])
     note_exceeded({case.name: case.result.verdict for case in bounds.cases if case.result is not None})
     if not bounds.succeeded:
         failed = "; ".join(f"{case.name}: {case.failure}" for case in bounds.cases if case.failure)
@@ -124,13 +125,8 @@ def _bound_suite(scene: str, factors: str, output: Path | None, suite: Path, as_
     from msfp_gen.common.output import make_folder
     from msfp_gen.scene.file.loader import load_suite
     from msfp_gen.studies.batch import build_models
-    from msfp_gen.studies.bounding import bound_suite, bounded_scenes, load_factors
-    from msfp_gen.studies.bounding.suite import (
-        plot_suite_bounds,
-        suite_bound_tables,
-        write_records,
-        write_statistics,
-    )
+    from msfp_gen.studies.bounding import bounded_scenes, load_factors
+    from msfp_gen.studies.bounding import suite as module
     from msfp_gen.studies.sweep import variations
 
     table = load_factors(factors)
@@ -143,24 +139,15 @@ def _bound_suite(scene: str, factors: str, output: Path | None, suite: Path, as_
         make_folder(output, "--output")
     build_models(scenes.values())
     with Progress(f"{len(scenes)} records") as progress:
-        bounds = bound_suite(scenes, table, name=Path(scene).stem, progress=progress)
-    answer(bounds.as_dict(), suite_bound_tables(bounds), as_json)
+        bounds = module.bound_suite(scenes, table, name=Path(scene).stem, progress=progress)
+    answer(bounds.as_dict(), module.suite_bound_tables(bounds), as_json)
     if output is not None:
-        plot_suite_bounds(bounds, output / "suite.png")
-        written = [write_statistics(bounds, output / "suite.csv"), write_records(bounds, output / "records.csv")]
-        note_written([*written, output / "suite.png"])
+        module.plot_suite_bounds(bounds, output / "suite.png")
+        numbers = module.write_statistics(bounds, output / "suite.csv")
+        note_written([numbers, module.write_records(bounds, output / "records.csv"), output / "suite.png"])
     if bounds.failures:
         (record, case), message = next(iter(bounds.failures.items()))
         raise RunError(f"{len(bounds.failures)} runs did not reach their end; the first: {record}, {case}: {message}")
-
-
-def _save(bounds: Bounds, folder: Path) -> list[Path]:
-    """Write every run as netCDF, the numbers as CSV and the loops as a figure; returns the paths."""
-    from msfp_gen.studies.bounding.runs import plot_bounds, write_quantities
-
-    written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in bounds.cases if case.result is not None]
-    plot_bounds(bounds, folder / "bounds.png")
-    return [*written, write_quantities(bounds, folder / "bounds.csv"), folder / "bounds.png"]
 
 
 @app.command(
@@ -252,14 +239,12 @@ def _measurements(
             raise InputError(f"--column = {text!r}: give the column and its header: force=Load cell [kN]")
         names[name.strip()] = header.strip()
     read = [read_measurement(path, names) for path in paths]
-    options = {
-        "axial_load": _numbers("--axial-load", loads, len(read)),
-        "weight": _numbers("--weights", weights, len(read)),
-    }
-    for name, values in options.items():
-        if values is not None:
-            read = [replace(test, **{name: value}) for test, value in zip(read, values, strict=True)]  # type: ignore[arg-type]
-    return read
+    of_loads: Sequence[float | None] = _numbers("--axial-load", loads, len(read)) or [test.axial_load for test in read]
+    of_weights = _numbers("--weights", weights, len(read)) or [test.weight for test in read]
+    return [
+        replace(test, axial_load=load, weight=weight)
+        for test, load, weight in zip(read, of_loads, of_weights, strict=True)
+    ]
 
 
 def _numbers(option: str, text: str | None, count: int) -> list[float] | None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -121,38 +122,37 @@ def run(
     question = {
         "quantity": estimate, "statistic": statistic, "threshold": threshold, "target": target, "budget": budget,
     }  # fmt: skip
+    engine: dict[str, Any] = {"workers": workers, "threads": threads, "dask": dask, "mpi": mpi}
     if "accuracy" in definition.table or any(value is not None for value in question.values()):
         if shard is not None:
             raise InputError("--shard: the runs of an estimate depend on those before; give --workers or --dask")
-        engine = {"workers": workers, "threads": threads, "dask": dask, "mpi": mpi}
-        _estimate(definition, output, question, engine, plot, as_json)
+        _estimate(definition, output, question | engine, plot, as_json)
         return
     if plot is not None:
         raise InputError("--plot: it draws an estimate; give --estimate too")
-    try:
-        with Progress(f"{definition.runs} runs") as progress:
-            done = module.study(
-                definition, output, workers=workers, threads=threads, dask=dask, mpi=mpi, shard=part, progress=progress
-            )
-    except KeyboardInterrupt:
-        note(f"what is done is kept in {output}; the same command continues")
-        raise
+    with _kept(output), Progress(f"{definition.runs} runs") as progress:
+        done = module.study(definition, output, shard=part, progress=progress, **engine)
     judged = any(column.name == "limits_exceeded" for column in definition.keep.columns())
     _report(done, output, as_json, judged)
 
 
-def _estimate(
-    definition: Study, output: Path, question: dict[str, Any], engine: dict[str, Any], plot: Path | None, as_json: bool
-) -> None:
-    """Estimate a statistic of a study and print it, in ten lines."""
-    from msfp_gen.studies.estimation.estimate import estimate, estimate_table, plot_estimate
-
-    _check(plot, None)
+@contextmanager
+def _kept(output: Path) -> Iterator[None]:
+    """Say where the runs are if the block is interrupted."""
     try:
-        result = estimate(definition, output, **question, **engine)
+        yield
     except KeyboardInterrupt:
         note(f"what is done is kept in {output}; the same command continues")
         raise
+
+
+def _estimate(definition: Study, output: Path, options: dict[str, Any], plot: Path | None, as_json: bool) -> None:
+    """Estimate a statistic of a study and print it, in ten lines. options: of `estimate`."""
+    from msfp_gen.studies.estimation.estimate import estimate, estimate_table, plot_estimate
+
+    _check(plot, None)
+    with _kept(output):
+        result = estimate(definition, output, **options)
     answer(result.as_dict(), [estimate_table(result)], as_json)
     for line in result.notes:
         note(line)
