@@ -132,7 +132,7 @@ def run(
         raise InputError("--plot: it draws an estimate; give --estimate too")
     with _kept(output), Progress(f"{definition.runs} runs") as progress:
         done = module.study(definition, output, shard=part, progress=progress, **engine)
-    judged = any(column.name == "limits_exceeded" for column in definition.keep.columns())
+    judged = any(column.name == "limits_exceeded" for column in definition.keep.columns)
     _report(done, output, as_json, judged)
 
 

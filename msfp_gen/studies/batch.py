@@ -22,7 +22,7 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
@@ -177,8 +177,9 @@ def pool_from(
     named = [name for name, value in choices.items() if value]
     if len(named) > 1:
         raise InputError(f"{named[0]} and {named[1]}: give one engine")
-    if executor is not None:
-        return pool_of(executor, workers)
+    if executor is not None:  # of the caller: it stays open
+        count = worker_count(workers) if workers is not None else getattr(executor, "_max_workers", UNKNOWN)
+        return nullcontext(Pool(executor, lambda: AHEAD * count, type(executor).__name__))
     if dask is not None:
         return dask_pool(dask)
     return mpi_pool() if mpi else local_pool(workers, processes=not threads)
@@ -204,13 +205,6 @@ def local_pool(workers: int | None = None, processes: bool = False) -> Iterator[
         raise
     finally:
         executor.shutdown(cancel_futures=True)
-
-
-@contextmanager
-def pool_of(executor: Executor, workers: int | None) -> Iterator[Pool]:
-    """An executor of the caller, which stays open. workers: how many calls it works on at the same time."""
-    count = worker_count(workers) if workers is not None else getattr(executor, "_max_workers", UNKNOWN)
-    yield Pool(executor, lambda: AHEAD * count, type(executor).__name__)
 
 
 @contextmanager

@@ -253,9 +253,26 @@ class Keep:
             sources |= {f"{CAPACITY_USED}_{k + 1}": Source(_CAPACITY_USED, k) for k in range(self.counts.surfaces)}
         return sources
 
+    @cached_property
     def columns(self) -> tuple[Column, ...]:
         """The columns, in the order of the study file. Raises InputError: an unknown quantity, or no valid formula."""
-        return _columns(self)
+        known, columns = self.known, []
+        for name in self.names:
+            columns_of_name = [key for key in known if key == name or re.fullmatch(rf"{re.escape(name)}_\d+", key)]
+            if not columns_of_name:
+                words = sorted({re.sub(r"_\d+$", "", key) for key in known})
+                hint = suggestion(name, words) or f"; the quantities are {', '.join(words)}"
+                raise InputError(f"keep: {name!r} is no quantity{hint}")
+            columns += [Column(key, known[key].quantity.unit, key in TEXTS) for key in columns_of_name]
+        for name, text in self.formulas:
+            _tree(self, name, text)
+            columns.append(Column(name, ""))
+        return tuple(dict.fromkeys(columns))
+
+    @property
+    def numbers(self) -> list[str]:
+        """Names of the columns that hold numbers."""
+        return [column.name for column in self.columns if not column.text]
 
     def values(self, result: Any, at: Mapping[str, float]) -> tuple[dict[str, Any], str]:
         """Column -> value, None where it is not defined; and a line about a characterisation that is not possible.
@@ -263,7 +280,7 @@ class Keep:
         at: the values of the axes that hold numbers.
         """
         reader, formulas, kept = _Reader(result, self), dict(self.formulas), {}
-        for name, _, _ in self.columns():
+        for name, _, _ in self.columns:
             text = formulas.get(name)
             kept[name] = reader.value(name) if text is None else self._evaluated(name, text, reader, at)
         return kept, reader.problem
@@ -281,22 +298,6 @@ class Keep:
             return _finite(formula.fold(tree, values, _OPERATIONS))
         except (ArithmeticError, ValueError):  # such as a division by zero
             return None
-
-
-@lru_cache(maxsize=16)
-def _columns(keep: Keep) -> tuple[Column, ...]:
-    known, columns = keep.known, []
-    for name in keep.names:
-        columns_of_name = [key for key in known if key == name or re.fullmatch(rf"{re.escape(name)}_\d+", key)]
-        if not columns_of_name:
-            words = sorted({re.sub(r"_\d+$", "", key) for key in known})
-            hint = suggestion(name, words) or f"; the quantities are {', '.join(words)}"
-            raise InputError(f"keep: {name!r} is no quantity{hint}")
-        columns += [Column(key, known[key].quantity.unit, key in TEXTS) for key in columns_of_name]
-    for name, text in keep.formulas:
-        _tree(keep, name, text)
-        columns.append(Column(name, ""))
-    return tuple(dict.fromkeys(columns))
 
 
 @lru_cache(maxsize=64)

@@ -235,7 +235,7 @@ def check_study(study: Study) -> Study:
     with recording() as files:
         study = _tried_study(replace(study, files=files))
     reserved = [INTENSITY] if study.recipe.intensities else []
-    names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in study.keep.columns())]
+    names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in study.keep.columns)]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InputError(f"{twice[0]}: this name occurs twice among axes, keep and quantities; give another")
     return study
@@ -379,8 +379,7 @@ def _suite(table: Mapping[str, Any], folder: Path | None, progress: Progress | N
     if "suite" in table:
         if not isinstance(table["suite"], str):
             raise InputError(f"records.suite = {table['suite']!r}: give a path in quotes")
-        path = (folder or Path()) / table["suite"]
-        return load_suite(path if is_input(path) else table["suite"], progress)
+        return load_suite(_beside(table["suite"], folder), progress)
     with prefixed("records.motions: "):
         return suite_from_table({"records": table["motions"]}, folder, progress)
 
@@ -437,8 +436,11 @@ def _checked(table: Mapping[str, Any], folder: Path | None, progress: Progress |
     for name, text in formulas:
         if not isinstance(text, str):
             raise InputError(f"quantities.{name} = {text!r}: give a formula in quotes, such as 'peak_sliding_1 / 0.13'")
+    kept = table.get("keep", BUILDING_KEEP if "building" in scene else DEFAULT_KEEP)
+    if not isinstance(kept, list | tuple) or not all(isinstance(item, str) for item in kept):
+        raise InputError(f"keep = {kept!r}: give {KEYS['keep']} in quotes")
     keep = Keep(
-        _texts(table, "keep", BUILDING_KEEP if "building" in scene else DEFAULT_KEEP),
+        tuple(kept),
         formulas,
         (*(axis.name for axis in axes if axis.numeric), *([INTENSITY] if intensities else [])),
     )
@@ -509,10 +511,3 @@ def _sampling(table: Mapping[str, Any], axes: tuple[Axis, ...]) -> Sampling | No
             f"sampling is missing: axes.{drawn[0]} has a distribution; give [sampling] with samples and seed"
         )
     return Sampling(**fields_of(table, "sampling", Sampling))
-
-
-def _texts(table: Mapping[str, Any], key: str, default: tuple[str, ...]) -> tuple[str, ...]:
-    value = table.get(key, list(default))
-    if not isinstance(value, list | tuple) or not all(isinstance(item, str) for item in value):
-        raise InputError(f"{key} = {value!r}: give {KEYS[key]} in quotes")
-    return tuple(value)

@@ -229,7 +229,7 @@ def _part(order: Order, rows: list[dict[str, Any]], failed: int, more: dict[str,
     axes = [Column(axis.name, "", not axis.numeric) for axis in order.recipe.axes]
     intensity = [Column(INTENSITY, "m/s^2")] if order.recipe.intensities else []
     texts = [Column("status", "", text=True), Column("message", "", text=True)]
-    columns = [*axes, *texts, *intensity, *order.keep.columns()]
+    columns = [*axes, *texts, *intensity, *order.keep.columns]
     types = {"run": "int64", **{name: "string" if text else "double" for name, _, text in columns}}
     values = {(name, unit): [row.get(name) for row in rows] for name, unit, _ in (Column("run", ""), *columns)}
     return parquet_bytes(values, types, {"digest": order.digest, "failed": str(failed), **more})
@@ -239,7 +239,7 @@ class Chunks:
     """The chunks of a study in a folder: of the size that they have there, unless the study file gives one."""
 
     def __init__(self, study: Study, folder: Path) -> None:
-        size = _about(folder).get("chunk")
+        size = _read(folder).get("about", {}).get("chunk")
         if study.given_chunk is None and isinstance(size, int) and size > 0 and parts_in(folder):
             study = replace(study, given_chunk=size)
         self.study, self.folder = study, folder
@@ -328,7 +328,7 @@ class Chunks:
             for name, number in present.items()
             if number >= chunks or self.path(self.study.task(number)).name != name
         ]
-        before = _about(self.folder)
+        before = _read(self.folder).get("about", {})
         old_runs, old_chunk = int(before.get("runs", 0)), int(before.get("chunk", 1))
         short = old_runs // old_chunk if old_runs % old_chunk else -1  # the last chunk, unless it was a whole one
         for name in other:
@@ -377,10 +377,6 @@ def readable_parts(path: Path) -> Iterator[None]:
 def _read(folder: Path) -> dict[str, Any]:
     path = folder / STUDY_FILE
     return toml_file(path) if path.is_file() else {}
-
-
-def _about(folder: Path) -> dict[str, Any]:
-    return dict(_read(folder).get("about", {}))
 
 
 def study_table(folder: Path) -> dict[str, Any]:

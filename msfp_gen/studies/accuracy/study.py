@@ -50,6 +50,7 @@ CONFIRMING_RUNS = 2  # most of such reruns
 TIGHTEST = 1e-11  # least tolerance of a reference run
 WRONG = 30.0  # a success is wrong if its RMS error exceeds this many tolerances,
 NEVER_WRONG, ALWAYS_WRONG = 1e-3, 0.1  # but never below the first error, and always above the second
+FAMILIES = {name: method.family for name, method in METHODS.items()}
 Say = Callable[[str], None]
 NAMES = tuple(field.name for field in fields(Errors))
 
@@ -135,7 +136,7 @@ def work_precision(
         trials += runs
         notes += left_out
     trials = with_reruns(trials, confirming_reruns(scene, trials, limit, say))
-    reference = best_reference([*trials, *tighter_runs(scene, trials, limit, say)], families())
+    reference = best_reference([*trials, *tighter_runs(scene, trials, limit, say)], FAMILIES)
     points = tuple(point_of(trial.method, trial, reference) for trial in trials)
     return Study(scene, "work-precision", points, reference, (*notes, *reference_notes(reference)))
 
@@ -158,7 +159,7 @@ def model_errors(
     name, confirming = CONFIRMING
     others, _ = run_tolerances(METHODS[name], scene, confirming, limit, say)
     extra = [*others, *tighter_runs(scene, full, limit, say), *confirming_reruns(scene, others, limit, say)]
-    reference = best_reference([*full, *extra], families())
+    reference = best_reference([*full, *extra], FAMILIES)
     points, notes = [point_of("as it stands", trial, reference) for trial in full], reference_notes(reference)
     for variant in VARIANTS:
         trials, left_out = _variant_trials(variant, scene, tolerances, limit, say)
@@ -199,11 +200,6 @@ def check_settings(tolerances: Sequence[float], limit: float) -> None:
         raise InputError("tolerances: none given; give some such as 1e-2,1e-4")
     if not 0 < limit < float("inf"):
         raise InputError(f"limit = {limit:g}: give seconds above zero")
-
-
-def families() -> dict[str, str]:
-    """Method -> family."""
-    return {name: method.family for name, method in METHODS.items()}
 
 
 def without_stop(scene: Scene) -> Scene:

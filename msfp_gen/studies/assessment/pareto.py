@@ -125,10 +125,9 @@ def pareto(
 
 def _check(study: Study, goals: Goals, population: int, generations: int) -> None:
     """Raise InputError for goals that the study does not have."""
-    known = [column.name for column in study.keep.columns() if not column.text]
     if len(goals.names) < 2 or len(set(goals.names)) < len(goals.names):
         raise InputError("pareto: give two or more different quantities to minimise or maximise")
-    check_columns((*goals.names, *(goals.at_most or {})), known)
+    check_columns((*goals.names, *(goals.at_most or {})), study.keep.numbers)
     if goals.statistic not in STATISTICS:
         raise InputError(f"statistic = {goals.statistic!r}: give one of {', '.join(STATISTICS)}")
     for word, value, least in (("population", population, 4), ("generations", generations, 1)):

@@ -242,7 +242,7 @@ def estimate(
                 result = fragility_of(runs, question, scales, lambda draws: np.log(runs.draws.intensity(draws)))
             else:
                 result = estimated(runs, question)
-                unit = {column.name: column.unit for column in study.keep.columns()}[question.quantity]
+                unit = {column.name: column.unit for column in study.keep.columns}[question.quantity]
                 unit = {"probability": "", "variance": f"({unit})^2" if unit else ""}.get(question.statistic, unit)
     except _BudgetError:
         if not begun:

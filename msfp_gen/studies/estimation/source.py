@@ -222,9 +222,9 @@ def level_study(study: Study, level: str, quantity: str) -> Study:
 
 def check_quantity(study: Study, quantity: str, levels: Sequence[str]) -> None:
     """Raise InputError: the study does not keep the quantity, or a model does not have it, or is not for the scene."""
-    kept = [column.name for column in study.keep.columns() if not column.text]
-    if quantity not in kept:
-        raise InputError(f"quantity = {quantity!r}: the study keeps {', '.join(kept)}; give one, or add it to keep")
+    if quantity not in study.keep.numbers:
+        kept = ", ".join(study.keep.numbers)
+        raise InputError(f"quantity = {quantity!r}: the study keeps {kept}; give one, or add it to keep")
     factory = SceneFactory(study.recipe)
     for level in levels:
         if level == "backbone":

@@ -197,7 +197,7 @@ def test_quantities_are_those_of_the_summary_the_characterisation_and_formulas()
     assert found["lost"] == result.history.energy["friction_dissipated"][-1] > 0
     capacity = result.scene.bearing.surfaces[3].capacity
     assert found["capacity_used_4"] == 1 - summary["minimum_gap"][3] / capacity
-    assert [column.unit for column in study.keep.columns()][:2] == ["N", "m"]
+    assert [column.unit for column in study.keep.columns][:2] == ["N", "m"]
 
 
 def test_extremes_of_formulas_are_over_all_steps_where_a_run_records_them() -> None:
