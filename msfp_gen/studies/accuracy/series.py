@@ -23,7 +23,7 @@ from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.scene.fidelity import Link, series_links
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Layout
-from msfp_gen.studies.accuracy.timed_run import OK, ROWS, Trial, comparison_times, require_base_motion_only
+from msfp_gen.studies.accuracy.timed_run import OK, Trial, comparison_times, require_base_motion_only
 
 if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
@@ -142,12 +142,20 @@ def run_series(scene: Scene, steps: int, arms: bool = False) -> Trial:
     if isinstance(scene.top, PrescribedTop):
         raise InputError("top.kind = 'prescribed': the linearised bearing is driven by displacements; give a rig")
     force, sliding = integrate(scene, series, times)
-    seconds, at = time.perf_counter() - begin, comparison_times(scene.end)
-    columns = np.column_stack([force.real, force.imag, sliding])
+    columns, seconds = np.column_stack([force.real, force.imag, sliding]), time.perf_counter() - begin
+    return _trial("linearised", scene, steps, times, columns, seconds)
+
+
+def _trial(name: str, scene: Scene, steps: int, times: Array, columns: Array, seconds: float) -> Trial:
+    """The trial of a run in equal steps from its force and sliding at times, which may end before the scene does."""
+    at, last = comparison_times(scene.end), float(times[-1])
+    at = at[at <= last * (1 + 1e-12)]
     rows = np.column_stack([np.interp(at, times, column) for column in columns.T])
-    assert len(rows) == ROWS + 1
-    end, cost = scene.end, (0, 0, steps)
-    return Trial("linearised", end / steps, OK, seconds, end, end, *cost, rows[:, :2], rows[:, 2:], stepped=True)
+    reached = len(times) - 1
+    status, message = (OK, "") if reached == steps else ("failed", f"analyze failed at t = {last:.4g} s")
+    cost, setting = (0, 0, reached), scene.end / steps
+    parts = rows[:, :2], rows[:, 2:]
+    return Trial(name, setting, status, seconds, last, scene.end, *cost, *parts, message, stepped=True)
 
 
 def _as_complex(vectors: Array) -> list[complex]:
@@ -212,13 +220,8 @@ def run_opensees(scene: Scene, steps: int) -> Trial:
         reached, force = _integrate(ops, scene, times)
     finally:
         ops.wipe()
-    seconds, at = time.perf_counter() - begin, comparison_times(scene.end)
-    at = at[at <= times[reached] * (1 + 1e-12)]
-    rows = np.column_stack([np.interp(at, times[: reached + 1], column) for column in force.T])
-    status, message = (OK, "") if reached == steps else ("failed", f"analyze failed at t = {times[reached]:.4g} s")
-    last, cost, sliding = float(times[reached]), (0, 0, reached), np.zeros((len(rows), 0))
-    setting = scene.end / steps
-    return Trial("OpenSees", setting, status, seconds, last, scene.end, *cost, rows, sliding, message, stepped=True)
+    seconds = time.perf_counter() - begin
+    return _trial("OpenSees", scene, steps, times[: reached + 1], force, seconds)
 
 
 def _links(scene: Scene) -> tuple[Link, Link, Link]:

@@ -122,21 +122,15 @@ def _interpolated(levels: Array, x: Array, y: Array, ended: Any) -> Array:
 
 
 def _curve_numbers(rows: Any, measure: str) -> Any:
-    """The number of the curve of each run, from 1: runs that have all axes but the intensity in common."""
-    import pandas as pd
+    """The number of the curve of each run, from 1: runs that have all axes but the intensity in common.
 
-    changing = {measure, SCALE} if measure == INTENSITY else {measure}
-    others = [name for name in axes_of(rows) if name not in changing]
-    if not others:
-        return np.ones(len(rows), dtype=int)
-    return pd.MultiIndex.from_frame(rows[others]).factorize()[0] + 1
-
-
-def axes_of(rows: Any) -> list[str]:
-    """The columns of the axes: those between `run` and `status`. Raises InputError where these are not there."""
+    The columns of the axes are those between `run` and `status`.
+    """
     names = list(rows.columns)
     check_columns(("run", "status"), names)
-    return names[names.index("run") + 1 : names.index("status")]
+    changing = {measure, SCALE} if measure == INTENSITY else {measure}
+    others = [name for name in names[names.index("run") + 1 : names.index("status")] if name not in changing]
+    return rows.groupby(others, sort=False, dropna=False).ngroup().to_numpy() + 1 if others else 1
 
 
 def ida_table(result: Ida) -> Table:
