@@ -100,35 +100,27 @@ def _factory(
 
 
 class Row(NamedTuple):
-    """A run of a sweep.
-
-    Its number from 1, source, varied fields by path, summary, the file with its rows, and the counts of its scene.
-    """
+    """A run of a sweep: its number from 1, its scene and varied fields, its summary, and the file with its rows."""
 
     number: int
-    source: str
-    varied: Mapping[str, Any]
+    variation: Variation
     summary: Mapping[str, Any]
     file: str
-    counts: Counts
 
     def as_dict(self) -> dict[str, Any]:
         """The summary with the varied fields, ready for JSON."""
-        about = {"number": self.number, "source": self.source, "varied": dict(self.varied), "file": self.file or None}
+        source, varied, _ = self.variation
+        about = {"number": self.number, "source": source, "varied": dict(varied), "file": self.file or None}
         return {**about, **self.summary}
 
 
 def row_of(number: int, variation: Variation, result: Result | BuildingResult | RunError, file: Path | None) -> Row:
     """The row of a run, or of one that failed before its first row; the result itself is not kept."""
-    if isinstance(result, RunError):
-        summary: Mapping[str, Any] = {"status": result.status, "message": str(result), "name": variation.scene.name}
-        if isinstance(variation.scene, BuildingScene):
-            summary = {**summary, "bearings": []}
-        file = None
-    else:
-        summary = result.summary
-    name = "" if file is None else file.name
-    return Row(number, variation.source, variation.varied, summary, name, Counts.of(variation.scene))
+    if not isinstance(result, RunError):
+        return Row(number, variation, result.summary, "" if file is None else file.name)
+    summary = {"status": result.status, "message": str(result), "name": variation.scene.name}
+    of_building = isinstance(variation.scene, BuildingScene)
+    return Row(number, variation, {**summary, "bearings": []} if of_building else summary, "")
 
 
 def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> Path:
@@ -137,16 +129,16 @@ def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> 
     The columns are the varied fields and the quantities of the summaries of bearings and of buildings.
     """
     rows = sorted(rows)
-    varied = dict.fromkeys(path for row in rows for path in row.varied)
+    varied = dict.fromkeys(path for row in rows for path in row.variation.varied)
     table: dict[tuple[str, str], list[Any]] = {
         ("number", ""): [row.number for row in rows],
-        ("scene", ""): [row.source for row in rows],
-        **{(path, ""): [plain_cell(row.varied.get(path)) for row in rows] for path in varied},
+        ("scene", ""): [row.variation.source for row in rows],
+        **{(path, ""): [plain_cell(row.variation.varied.get(path)) for row in rows] for path in varied},
     }
     counts: dict[bool, Counts] = {}
     for row in rows:
-        of_building = row.counts.bearings > 0
-        counts[of_building] = counts.get(of_building, Counts()).or_more(row.counts)
+        own = Counts.of(row.variation.scene)
+        counts[own.bearings > 0] = counts.get(own.bearings > 0, Counts()).or_more(own)
     sources = {name: source for _, count in sorted(counts.items()) for name, source in catalogue(count).items()}
     for column, source in sources.items():
         if source.quantity.characterised:
@@ -160,13 +152,13 @@ def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> 
 def sweep_table(rows: Sequence[Row]) -> Table:
     """The rows for a terminal, 80 columns wide at most: what does not fit is only in the table that is written."""
     rows = sorted(rows)
-    every = dict.fromkeys(path for row in rows for path in row.varied)
-    paths = [path for path in every if len(rows) == 1 or len({str(row.varied.get(path)) for row in rows}) > 1]
-    scenes = {row.source for row in rows}
+    every = dict.fromkeys(path for row in rows for path in row.variation.varied)
+    paths = [path for path in every if len(rows) == 1 or len({str(row.variation.varied.get(path)) for row in rows}) > 1]
+    scenes = {row.variation.source for row in rows}
     leading = {"no.": [str(row.number) for row in rows]}
     if len(scenes) > 1 or not paths:
-        leading["scene"] = [_short(Path(row.source).stem) for row in rows]
-    varied = {path: [_short(str(row.varied.get(path, ""))) for row in rows] for path in paths}
+        leading["scene"] = [_short(Path(row.variation.source).stem) for row in rows]
+    varied = {path: [_short(str(row.variation.varied.get(path, ""))) for row in rows] for path in paths}
     peaks = {
         "status": [str(row.summary["status"]) for row in rows],
         "u [mm]": [_number(row, "peak_displacement.radial", 1e3, 2) for row in rows],

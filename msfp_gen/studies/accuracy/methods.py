@@ -219,23 +219,15 @@ def _with_effects(changes: dict[str, Any], scene: Scene, rtol: float, limit: flo
 
 def _axis_by_axis(scene: Scene, effects: Any, rtol: float, limit: float) -> Trial:
     """Run a motion in two directions by one planar model for each horizontal axis, uncoupled, and combine them."""
-    one, two = (
-        run_native(
-            "implicit",
-            replace(scene, effects=effects, motion=_along(scene.motion, axis), motion_table=None),
-            rtol,
-            limit,
-        )
-        for axis in (0, 1)
-    )
+    planar = replace(scene, effects=effects, motion_table=None)
+    motions = (_along(scene.motion, axis) for axis in (0, 1))
+    one, two = (run_native("implicit", replace(planar, motion=motion), rtol, limit) for motion in motions)
     worse = max(one, two, key=lambda t: not t.finished)
     rows = min(len(one.force), len(two.force))
+    sums = {name: getattr(one, name) + getattr(two, name) for name in ("seconds", "newton", "evaluations", "steps")}
     return replace(
         worse,
-        seconds=one.seconds + two.seconds,
-        newton=one.newton + two.newton,
-        evaluations=one.evaluations + two.evaluations,
-        steps=one.steps + two.steps,
+        **sums,
         reached=min(one.reached, two.reached),
         force=np.column_stack([one.force[:rows, 0], two.force[:rows, 1]]),
         sliding=np.hypot(one.sliding[:rows], two.sliding[:rows]),

@@ -358,13 +358,8 @@ def fragility_frame(result: Fragility) -> Any:
     for state in result.states:
         x = np.geomspace(state.intensity.min(), state.intensity.max(), POINTS)
         low, high = state.band(x)
-        columns = {
-            "case": state.case,
-            "threshold": state.threshold,
-            result.measure: x,
-            "probability": state.probability(x),
-        }
-        frames.append(pd.DataFrame({**columns, "low": low, "high": high}))
+        columns = {"case": state.case, "threshold": state.threshold, result.measure: x}
+        frames.append(pd.DataFrame({**columns, "probability": state.probability(x), "low": low, "high": high}))
     return pd.concat(frames, ignore_index=True)
 
 
@@ -391,10 +386,7 @@ def fragility_table(result: Fragility) -> Table:
 
 
 def plot_fragility(result: Fragility, path: str | Path | None = None, title: str = "") -> Figure:
-    """Probability of exceedance over intensity: curve, confidence band and observed shares of every damage state.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Probability of exceedance over intensity: curve, band and shares of every damage state. path: as of `page`."""
     every = np.concatenate([state.intensity for state in result.states])
     x = np.geomspace(every.min(), every.max(), DRAWN)
     scale = scale_of([state.threshold for state in result.states], result.unit)

@@ -146,10 +146,7 @@ def ida_table(result: Ida) -> Table:
 
 
 def plot_ida(result: Ida, path: str | Path | None = None, title: str = "") -> Figure:
-    """Intensity over demand: every curve, with a cross where a run ended early, and the fractiles.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Intensity over demand: every curve, with a cross where a run ended early, and fractiles. path: as of `page`."""
     scale = scale_of(result.curves[result.demand], result.unit)
     with page(*SIZE, path) as figure:
         headline(figure, title or "incremental dynamic analysis")

@@ -222,10 +222,7 @@ def front_table(front: Front) -> Table:
 
 
 def plot_pareto(result: Front, path: str | Path | None = None, title: str = "") -> Figure:
-    """The first two objectives: all designs, and those on the front joined by a line.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """The first two objectives: all designs, and those on the front joined by a line. path: as of `page`."""
     first, second = result.goals.names[:2]
     designs, front = result.designs, result.designs[result.designs.front].sort_values(first)
     scales = [scale_of(designs[name], result.units.get(name, "")) for name in (first, second)]

@@ -183,10 +183,7 @@ def sobol_table(result: Sobol) -> Table:
 
 
 def plot_tornado(result: Tornado, path: str | Path | None = None, title: str = "") -> Figure:
-    """Bars of the quantity between the low and the high value of each axis, the longest on top.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Bars of the quantity between the low and the high value of each axis, longest on top. path: as of `page`."""
     scale = scale_of([value for bar in result.bars for value in (bar.at_low, bar.at_high)], result.unit)
     base = scale.factor * result.base
     with page(SIZE[0], 1.4 + 0.45 * len(result.bars), path) as figure:
@@ -209,10 +206,7 @@ def plot_tornado(result: Tornado, path: str | Path | None = None, title: str = "
 
 
 def plot_sobol(result: Sobol, path: str | Path | None = None, title: str = "") -> Figure:
-    """First-order and total Sobol' indices of every axis with confidence intervals, the largest total on top.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Sobol' indices of every axis with confidence intervals, the largest total on top. path: as of `page`."""
     count = len(result.axes)
     with page(SIZE[0], 1.6 + 0.5 * count, path) as figure:
         headline(figure, title or f"Sobol' indices of {labelled(result.name, '')}")

@@ -220,10 +220,7 @@ DRAWN = 24  # tests; more would make a picture that few programs open
 
 
 def plot_fit(tests: Sequence[FittedTest], title: str = "fit", path: str | Path | None = None) -> Figure:
-    """Measured and fitted loops, and below each the residual over time, for the first 24 tests.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Measured and fitted loops, below each the residual over time, for the first 24 tests. path: as of `page`."""
     drawn, across = tests[:DRAWN], min(len(tests), ACROSS)
     rows = -(-len(drawn) // across)
     with page(max(4.2 * across, 6.0), 6.4 * rows, path, "fit") as figure:

@@ -557,10 +557,7 @@ def estimate_table(result: Estimate) -> Table:
 
 
 def plot_estimate(result: Estimate, path: str | Path | None = None, title: str = "") -> Figure:
-    """Half the width of the interval over the seconds of all runs: the mixture as it was, and plain Monte Carlo.
-
-    Raises InputError for a path that cannot be written.
-    """
+    """Half the width of the interval over seconds: the mixture as it was, and plain Monte Carlo. path: as of `page`."""
     seconds, half = np.array(result.trace).T
     with page(WIDTH, HEIGHT, path) as figure:
         headline(figure, title or f"{result.statistic} of {labelled(result.quantity, '')}: what an interval costs")
