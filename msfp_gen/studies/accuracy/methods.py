@@ -219,9 +219,9 @@ def _with_effects(changes: dict[str, Any], scene: Scene, rtol: float, limit: flo
 
 def _axis_by_axis(scene: Scene, effects: Any, rtol: float, limit: float) -> Trial:
     """Run a motion in two directions by one planar model for each horizontal axis, uncoupled, and combine them."""
-    planar = replace(scene, effects=effects, motion_table=None)
     motions = (_along(scene.motion, axis) for axis in (0, 1))
-    one, two = (run_native("implicit", replace(planar, motion=motion), rtol, limit) for motion in motions)
+    planar = (replace(scene, effects=effects, motion=motion, motion_table=None) for motion in motions)
+    one, two = (run_native("implicit", own, rtol, limit) for own in planar)
     worse = max(one, two, key=lambda t: not t.finished)
     rows = min(len(one.force), len(two.force))
     sums = {name: getattr(one, name) + getattr(two, name) for name in ("seconds", "newton", "evaluations", "steps")}
