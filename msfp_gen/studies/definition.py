@@ -36,7 +36,7 @@ from msfp_gen.studies.axes import (
     motion_of,
 )
 from msfp_gen.studies.batch import check_method
-from msfp_gen.studies.bounding import load_factors
+from msfp_gen.studies.bounding.factors import check_numbers, load_factors
 from msfp_gen.studies.columns import Counts, Keep
 
 if TYPE_CHECKING:
@@ -416,6 +416,7 @@ def _for_search(table: Mapping[str, Any]) -> Table:
 
 
 def _study(table: Mapping[str, Any], folder: Path | None, progress: Progress | None, design: bool) -> Study:
+    check_numbers(table)
     table = _for_search(table) if design else table
     known_keys(table, KEYS, "")
     if "scene" not in table:
