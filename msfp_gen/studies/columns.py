@@ -110,10 +110,11 @@ MOVING = "the run ends while the bearing still moves: give motion.hold, such as 
 
 
 class Source(NamedTuple):
-    """A quantity, or that of one surface, floor, storey or bearing, by its place from 0."""
+    """A quantity, or that of one surface, floor, storey or bearing, by its place from 0; part: the name of that one."""
 
     quantity: Quantity
     place: int | None = None
+    part: str = ""
 
     def reason(self, characterisation: Any) -> str:
         """Why a run that was characterised has no value; "" where no reason is known."""

@@ -63,7 +63,7 @@ class SuiteBounds:
     Attributes:
         table: the table of factors.
         records: names of the motions.
-        sources: column -> quantity. parts: column -> name of its bearing, storey, floor or surface; "" for the whole.
+        sources: column -> quantity, with the name of its bearing, storey, floor or surface.
         values: column -> value, shape (records, cases) [SI]; NaN where a run has none.
         failures: record and case -> message of a run that failed.
         undefined: column -> why runs that reached their end have no value.
@@ -74,7 +74,6 @@ class SuiteBounds:
     table: FactorTable
     records: tuple[str, ...]
     sources: Mapping[str, Source]
-    parts: Mapping[str, str]
     values: Mapping[str, Array]
     failures: Mapping[tuple[str, str], str]
     undefined: Mapping[str, str]
@@ -90,13 +89,13 @@ class SuiteBounds:
         )
 
     def _statistic(self, name: str, values: Array) -> Statistic:
-        unit, governs = self.sources[name].quantity.unit, self.sources[name].quantity.governs
-        pick = WORST[governs]
+        quantity, _, part = self.sources[name]
+        pick = WORST[quantity.governs]
         means, worst = values.mean(axis=0), pick(values, axis=0)
         case = CASES[int(np.flatnonzero(means == pick(means))[0])]
         record = self.records[int(np.argwhere(values == pick(values))[0][0])]
         numbers = tuple(means.tolist()), tuple(worst.tolist())
-        return Statistic(name, self.parts[name], unit, governs, *numbers, case, record)
+        return Statistic(name, part, quantity.unit, quantity.governs, *numbers, case, record)
 
     @property
     def left_out(self) -> dict[str, str]:
@@ -129,7 +128,7 @@ def bound_suite(
     scenes: name of the record -> the scene with its motion. name: of the whole, in the figure. progress: as of `bound`.
     """
     first = next(iter(scenes.values()))
-    sources, parts = _quantities(first)
+    sources = _quantities(first)
     values = {key: np.full((len(scenes), len(CASES)), np.nan) for key in sources}
     failures: dict[tuple[str, str], str] = {}
     undefined: dict[str, str] = {}
@@ -156,7 +155,7 @@ def bound_suite(
         raise RunError(
             f"no run of the suite reached its end; the first: {next(iter(failures.values()))}", status="bound"
         )
-    return SuiteBounds(name, table, tuple(scenes), sources, parts, values, failures, undefined, exceeded)
+    return SuiteBounds(name, table, tuple(scenes), sources, values, failures, undefined, exceeded)
 
 
 def _share(progress: Progress, row: int, count: int) -> Progress:
@@ -164,8 +163,8 @@ def _share(progress: Progress, row: int, count: int) -> Progress:
     return lambda done, whole: progress(row + done / whole, count)
 
 
-def _quantities(scene: AnyScene) -> tuple[dict[str, Source], dict[str, str]]:
-    """The quantities of which one value governs, and the names of the parts that they are of."""
+def _quantities(scene: AnyScene) -> dict[str, Source]:
+    """The quantities of which one value governs, with the names of the parts that they are of."""
     names: dict[str, list[str]] = {}
     if not isinstance(scene, Scene):
         names = {
@@ -174,12 +173,11 @@ def _quantities(scene: AnyScene) -> tuple[dict[str, Source], dict[str, str]]:
             "bearings": [bearing.name or f"bearing {number}" for number, bearing in enumerate(scene.bearings, 1)],
         }
     sources = {name: source for name, source in catalogue(Counts.of(scene)).items() if source.quantity.governs}
-    parts = {}
     for name, source in sources.items():
-        labels = names.get(source.quantity.path.partition(".*")[0])
-        place = source.place
-        parts[name] = "" if place is None else labels[place] if labels else f"surface {place + 1}"
-    return sources, parts
+        if source.place is not None:
+            labels = names.get(source.quantity.path.partition(".*")[0])
+            sources[name] = source._replace(part=labels[source.place] if labels else f"surface {source.place + 1}")
+    return sources
 
 
 def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
@@ -192,7 +190,7 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
             name = f"{_label(statistic.name, '')} [{unit}]"
             rows.append((name, *numbers, statistic.governs, statistic.record))
     columns = ("", *(f"mean {case}" for case in CASES), *(f"worst {case}" for case in CASES), "governs", "worst record")
-    reasons = [(_label(name, bounds.parts[name]), why) for name, why in bounds.left_out.items()]
+    reasons = [(_label(name, bounds.sources[name].part), why) for name, why in bounds.left_out.items()]
     exceeded = [(f"{record}, {case}", verdict) for (record, case), verdict in bounds.exceeded.items()]
     failed = [(f"{record}, {case}", message) for (record, case), message in bounds.failures.items()]
     tables = [
@@ -241,7 +239,7 @@ def write_records(bounds: SuiteBounds, path: str | Path) -> Path:
     }
     for name, values in bounds.values.items():
         cells = [None if np.isnan(value) else value for value in values.reshape(len(bounds.records) * count).tolist()]
-        columns[_label(name, bounds.parts[name]), bounds.sources[name].quantity.unit or "1"] = cells
+        columns[_label(name, bounds.sources[name].part), bounds.sources[name].quantity.unit or "1"] = cells
     return write_columns(check_output(path, (".csv",)), columns)
 
 

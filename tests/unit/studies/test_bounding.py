@@ -398,7 +398,8 @@ def test_a_suite_at_bounds_is_that_of_its_records(tmp_path: Path, capsys: Any) -
 
 def test_a_suite_of_a_building_has_the_names_of_its_bearings() -> None:
     made = load_scene("hospital-clc")
-    sources, parts = _quantities(made)
+    sources = _quantities(made)
+    parts = {name: source.part for name, source in sources.items()}
     assert [parts[f"bearing_displacement_{number}"] for number in range(1, 13)] == [
         f"{column}{row}" for row in (1, 2, 3) for column in "ABCD"
     ]
