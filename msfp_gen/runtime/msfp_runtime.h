@@ -15,23 +15,21 @@ extern "C" {
 
 /* Functions that run on columns or on all surfaces are compiled for wider vectors: for those of the processor whose
  * level MSFP_X86_64_LEVEL is, or, where it is not defined, once for each level, and the processor selects a version when
- * the model is loaded. No version fuses a multiplication with an addition, so all give the same numbers. */
+ * the model is loaded. No version fuses a multiplication with an addition, so all give the same numbers.
+ * Never for vectors of eight numbers: gcc 12.2 then compiled contact.c wrongly for 9 to 12 surfaces, whose lanes are a
+ * vector of eight and one of four. */
 #if !(defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12 && defined(__x86_64__) && defined(__linux__))
 #define MSFP_WIDE
+#elif defined(__AVX512F__) /* by the flags of the user, such as -march=native */
+#define MSFP_WIDE __attribute__((target("prefer-vector-width=256")))
 #elif !defined(MSFP_X86_64_LEVEL)
-#define MSFP_WIDE __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#define MSFP_WIDE __attribute__((target_clones("arch=x86-64-v3", "default")))
 #elif MSFP_X86_64_LEVEL >= 4
-#define MSFP_WIDE __attribute__((target("arch=x86-64-v4")))
-#define MSFP_COLUMNWISE __attribute__((target("arch=x86-64-v4,prefer-vector-width=256")))
+#define MSFP_WIDE __attribute__((target("arch=x86-64-v4,prefer-vector-width=256")))
 #elif MSFP_X86_64_LEVEL == 3
 #define MSFP_WIDE __attribute__((target("arch=x86-64-v3")))
 #else
 #define MSFP_WIDE
-#endif
-/* Functions on the columns of gradients, MSFP_COLUMNS of them: vectors of eight numbers would read what has just been
- * written in vectors of four, which takes longer. */
-#ifndef MSFP_COLUMNWISE
-#define MSFP_COLUMNWISE MSFP_WIDE
 #endif
 /* Before a short loop of constant length, so that the tables it reads are constants when it is compiled. */
 #if defined(__GNUC__) && !defined(__clang__)

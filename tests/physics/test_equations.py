@@ -267,7 +267,12 @@ BELOW = [*product([(2, 1, 0), (4, 2, 1), (5, 2, 2), (5, 1, 3), (11, 5, 5)], STAC
 
 
 def other_tests_build(layout, effects):
-    """Every effect in one layout; one surface, and numbers of surfaces that do not fill the vectors."""
+    """Every effect in one layout; one surface, and numbers of surfaces that do not fill the vectors.
+
+    And ten surfaces where friction follows the slip of a step, whose tangent gcc 12.2 compiled wrongly for AVX-512.
+    """
+    if layout == (11, 5, 5):
+        return effects == {"dimension": "planar", "sliders": "massless"}
     if layout == (4, 2, 1):
         return effects == {"dimension": "planar"}
     return (layout == (5, 2, 2) and effects != {"sliders": "massless"}) or (layout == (2, 1, 0) and not effects)

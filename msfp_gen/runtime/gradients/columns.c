@@ -24,7 +24,8 @@ MSFP_INLINE void put_separation(double *block, const msfp_columns *q, const msfp
     const msfp_columns *const orders[3] = { q, v, a };
     for (int order = 0; order < 3; ++order)
         for (int i = 0; i < MSFP_SPACE; ++i)
-            memcpy(block + msfp_separation_field(order, i) * C, orders[order][3 + (MSFP_PLANAR ? 2 * i : i)], sizeof *q);
+            memcpy(block + msfp_separation_field(order, i) * C, orders[order][3 + (MSFP_PLANAR ? 2 * i : i)],
+                   sizeof *q);
 }
 #else
 #define put_separation(block, q, v, a) ((void)0)
@@ -104,8 +105,8 @@ MSFP_INLINE void top_columns(const msfp_parameters *p, const msfp_parameter_colu
     msfp_top_directions(p, dp, w, d, s, ds);
 }
 
-MSFP_COLUMNWISE void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                                       const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
+MSFP_WIDE void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                                 const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
     if (msfp_top_is_sprung(p)) {
         double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
@@ -120,8 +121,8 @@ MSFP_COLUMNWISE void msfp_foot_columns(const msfp_parameters *p, const msfp_para
 }
 
 #if MSFP_RIMS
-MSFP_COLUMNWISE void msfp_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
-                                      int j, const msfp_work_columns *d, double *columns)
+MSFP_WIDE void msfp_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w, int j,
+                                const msfp_work_columns *d, double *columns)
 {
     double x[MSFP_RIM_LOCAL], dx[MSFP_RIM_LOCAL * C];
     msfp_rim_coordinates(w->body[j], w->x[j + 1], x);
@@ -130,10 +131,9 @@ MSFP_COLUMNWISE void msfp_rim_columns(const msfp_parameters *p, const msfp_param
 }
 #endif
 
-MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
-                                            const msfp_point *at, const msfp_point_columns *dat, const msfp_seed *seed,
-                                            const msfp_work *w, const msfp_slopes *slopes, int wanted,
-                                            msfp_work_columns *d)
+MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                                      const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
+                                      const msfp_slopes *slopes, int wanted, msfp_work_columns *d)
 {
     msfp_blocks s;
     msfp_block_directions ds;
@@ -170,8 +170,8 @@ MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp
 }
 
 /* As msfp_lu_solve for all columns at once. */
-MSFP_COLUMNWISE void msfp_solve_columns(const double *restrict factors, const int *restrict pivots,
-                                        msfp_columns *restrict columns)
+MSFP_WIDE void msfp_solve_columns(const double *restrict factors, const int *restrict pivots,
+                                  msfp_columns *restrict columns)
 {
     enum { PACKS = C / MSFP_PACK_SIZE };
     msfp_pack *const x = (msfp_pack *)columns;
@@ -197,7 +197,7 @@ MSFP_COLUMNWISE void msfp_solve_columns(const double *restrict factors, const in
     }
 }
 
-MSFP_COLUMNWISE void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[NB][2], msfp_columns f[NB][2])
+MSFP_WIDE void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[NB][2], msfp_columns f[NB][2])
 {
     for (int j = 0; j < NB; ++j)
         for (int i = 0; i < MSFP_SHEAR_SIZE; ++i) {

@@ -23,8 +23,8 @@ MSFP_INLINE void third_derivative(const msfp_history *h, double t, double out[6]
     }
 }
 
-MSFP_COLUMNWISE void msfp_inputs_columns(msfp_run *run, msfp_parameter_batch *batch, double t, const double *dt,
-                                         msfp_point_columns *dat)
+MSFP_WIDE void msfp_inputs_columns(msfp_run *run, msfp_parameter_batch *batch, double t, const double *dt,
+                                   msfp_point_columns *dat)
 {
     double found[3][6], third[6];
     if (run->next_jump < run->jump_count && t >= run->jumps[run->next_jump]) /* as msfp_point_at */

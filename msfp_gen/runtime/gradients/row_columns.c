@@ -138,8 +138,8 @@ static void limit_row(msfp_run *run, msfp_parameter_batch *batch, int count, msf
         memset(d[limits.zero[i]], 0, sizeof *d);
 }
 
-MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batch *batch, double share, int moving,
-                                              msfp_row_columns d)
+MSFP_WIDE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batch *batch, double share, int moving,
+                                        msfp_row_columns d)
 {
     all_node_columns(run, batch);
     const msfp_recording *rows = &run->gradients->recording;

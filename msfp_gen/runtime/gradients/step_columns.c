@@ -96,7 +96,8 @@ MSFP_INLINE void add_rates(const double *row, const msfp_columns *x, double *col
         columns[c] -= sum[c];
 }
 
-/* Columns of a solved stage and of its rates, by the derivatives with respect to its unknowns that its tangent contains. */
+/* Columns of a solved stage and of its rates, by the derivatives with respect to its unknowns that its tangent
+ * contains. */
 MSFP_INLINE void stage_state(msfp_run *run, msfp_parameter_batch *batch, int i, const msfp_state_columns *from,
                              msfp_state_columns *to)
 {
@@ -139,7 +140,7 @@ MSFP_INLINE void stage_state(msfp_run *run, msfp_parameter_batch *batch, int i, 
     memset(to->power, 0, sizeof to->power);
 }
 
-static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_parameter_batch *batch)
+static MSFP_WIDE void implicit_step(msfp_run *run, msfp_parameter_batch *batch)
 {
     const msfp_tableau *method = msfp_tableau_of(run->options.method);
     const double h = run->gradients->stage_history.stage[1].beta / method->gamma;
@@ -168,7 +169,7 @@ static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_parameter_batch *b
 enum { ANGLE = 1 };
 
 /* A quasi-static step: the parabola through the last two states, at whose end forces balance (quasistatic.c). */
-static MSFP_COLUMNWISE void quasistatic_step(msfp_run *run, msfp_parameter_batch *batch)
+static MSFP_WIDE void quasistatic_step(msfp_run *run, msfp_parameter_batch *batch)
 {
     const msfp_state_columns *now = &batch->now;
     msfp_state_columns *next = &batch->next;
@@ -195,8 +196,7 @@ static MSFP_COLUMNWISE void quasistatic_step(msfp_run *run, msfp_parameter_batch
     msfp_friction_columns(&batch->work, next->df, next->f);
     for (int k = 0; k < NB; ++k)
         for (int c = 0; c < C; ++c)
-            next->a[k][ANGLE][c] =
-                2.0 * (next->v[k][ANGLE][c] - (next->q[k][ANGLE][c] - now->q[k][ANGLE][c]) / h) / h;
+            next->a[k][ANGLE][c] = 2.0 * (next->v[k][ANGLE][c] - (next->q[k][ANGLE][c] - now->q[k][ANGLE][c]) / h) / h;
     if (run->gradients->energies)
         msfp_quasistatic_works(run, batch);
 }
