@@ -72,31 +72,25 @@ def variations(
         raise InputError(f"--vary {motion[0]}: --suite gives the motion; change its records there")
     if repeated := [path for path in paths if paths.count(path) > 1]:
         raise InputError(f"--vary {repeated[0]}: given twice; give all its values at once")
-    lists = [*([[record.name for record in records]] if records else []), *(values for _, values in fields)]
-    if prod(map(len, lists)) > MAX_SCENES:
-        raise InputError(f"--vary: {prod(map(len, lists))} scenes; give at most {MAX_SCENES} in all")
-    names = [*(["record"] if records else []), *paths]
-    table, path = scene_table(source)
-    with prefixed("" if path is None else f"{path}: "):
-        factory, axes = _factory(table, None if path is None else path.parent, fields, records)
-        scenes = []
-        for shown, values in zip(product(*lists), product(*axes), strict=True):
-            scene, varied = factory.scene(values), dict(zip(names, shown, strict=True))
-            shown_values = [f"{field} = {value}" for field, value in varied.items()]
-            name = ", ".join([scene.name or Path(source).stem, *shown_values])
-            scenes.append(Variation(str(source), varied, replace(scene, name=name)))
-        return scenes
-
-
-def _factory(
-    table: dict[str, Any], folder: Path | None, fields: Sequence[tuple[str, list[Any]]], records: Sequence[SuiteRecord]
-) -> tuple[SceneFactory, list[tuple[Any, ...]]]:
-    """What makes the scenes, and the values of its axes."""
     tables = {record.name: record.table for record in records}
     axes = [Axis("record", "record", values=tuple(tables))] if records else []
-    axes += [located(Axis(path, "sets", (path,), values=tuple(values)), folder) for path, values in fields]
-    scene = with_absolute_paths(table if not records else {**table, "motion": motion_of(records[0].table)}, folder)
-    return SceneFactory(Recipe(scene, tuple(axes), tables, {}, {})), [axis.values or () for axis in axes]
+    axes += [Axis(path, "sets", (path,), values=tuple(values)) for path, values in fields]
+    lists = [axis.values or () for axis in axes]
+    if prod(map(len, lists)) > MAX_SCENES:
+        raise InputError(f"--vary: {prod(map(len, lists))} scenes; give at most {MAX_SCENES} in all")
+    table, file = scene_table(source)
+    folder = None if file is None else file.parent
+    with prefixed("" if file is None else f"{file}: "):
+        axes = [located(axis, folder) for axis in axes]
+        scene = with_absolute_paths(table if not records else {**table, "motion": motion_of(records[0].table)}, folder)
+        factory = SceneFactory(Recipe(scene, tuple(axes), tables, {}, {}))
+        scenes = []
+        for shown, values in zip(product(*lists), product(*(axis.values or () for axis in axes)), strict=True):
+            run, varied = factory.scene(values), {axis.name: value for axis, value in zip(axes, shown, strict=True)}
+            shown_values = [f"{field} = {value}" for field, value in varied.items()]
+            name = ", ".join([run.name or Path(source).stem, *shown_values])
+            scenes.append(Variation(str(source), varied, replace(run, name=name)))
+        return scenes
 
 
 class Row(NamedTuple):

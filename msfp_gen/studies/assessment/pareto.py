@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -58,6 +58,11 @@ class Goals:
         return (*self.minimise, *self.maximise)
 
     @property
+    def limits(self) -> dict[str, float]:
+        """The limits; empty without any."""
+        return dict(self.at_most or {})
+
+    @property
     def signs(self) -> Array:
         """1 for an objective to be minimised, -1 for one to be maximised, shape (objectives,) [-]."""
         return np.array([1.0] * len(self.minimise) + [-1.0] * len(self.maximise))
@@ -105,55 +110,45 @@ def pareto(
     """
     require("pymoo", "pymoo", "a Pareto search")
     study = load_study(source, design=True)
-    if not any(axis.random for axis in study.axes):
-        raise InputError(
-            "axes: none has a distribution, so that there is nothing to search; give its bounds as `uniform`"
-        )
     _check(study, goals, population, generations)
-    folder = Path(output)
-    with pool_from(**engine) as pool:
-        search = _search(study, goals, population, generations, seed)
-        number, shares = next(search)
-        generation_designs = [_evaluated(study, number, shares, goals, pool, folder)]
-        while number < generations:
-            if progress is not None:
-                progress(number, generations)
-            number, shares = search.send(_objectives(generation_designs[-1], goals))
-            generation_designs.append(_evaluated(study, number, shares, goals, pool, folder))
-    return _front(generation_designs, goals, folder)
-
-
-def _check(study: Study, goals: Goals, population: int, generations: int) -> None:
-    """Raise InputError for goals that the study does not have."""
-    if len(goals.names) < 2 or len(set(goals.names)) < len(goals.names):
-        raise InputError("pareto: give two or more different quantities to minimise or maximise")
-    check_columns((*goals.names, *(goals.at_most or {})), study.keep.numbers)
-    if goals.statistic not in STATISTICS:
-        raise InputError(f"statistic = {goals.statistic!r}: give one of {', '.join(STATISTICS)}")
-    for word, value, least in (("population", population, 4), ("generations", generations, 1)):
-        if value < least:
-            raise InputError(f"{word} = {value}: give {least} or more")
-
-
-def _search(
-    study: Study, goals: Goals, population: int, generations: int, seed: int
-) -> Generator[tuple[int, Array], tuple[Array, Array], None]:
-    """Yields the number of a generation and its shares of the distributions; is sent objectives and limits."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.evaluator import Evaluator
     from pymoo.core.problem import Problem
     from pymoo.problems.static import StaticProblem
 
-    count = sum(axis.random for axis in study.axes)
-    limits = 1 + len(goals.at_most or {})
+    count, limits = sum(axis.random for axis in study.axes), 1 + len(goals.limits)
     problem = Problem(n_var=count, n_obj=len(goals.names), n_ieq_constr=limits, xl=0.0, xu=1.0)
     algorithm = NSGA2(pop_size=population)
     algorithm.setup(problem, termination=("n_gen", generations), seed=seed, verbose=False)
-    for number in range(1, generations + 1):
-        asked = algorithm.ask()
-        objectives, violated = yield number, np.asarray(asked.get("X"), dtype=float)
-        Evaluator().eval(StaticProblem(problem, F=objectives, G=violated), asked)
-        algorithm.tell(infills=asked)
+    parts = []
+    with pool_from(**engine) as pool:
+        for number in range(1, generations + 1):
+            asked = algorithm.ask()
+            shares = np.asarray(asked.get("X"), dtype=float)
+            parts.append(_evaluated(study, number, shares, goals, pool, Path(output)))
+            if number < generations:
+                objectives, violated = _objectives(parts[-1], goals)
+                Evaluator().eval(StaticProblem(problem, F=objectives, G=violated), asked)
+                algorithm.tell(infills=asked)
+                if progress is not None:
+                    progress(number, generations)
+    return _front(parts, goals, Path(output))
+
+
+def _check(study: Study, goals: Goals, population: int, generations: int) -> None:
+    """Raise InputError for a study without random axes, or for goals that it does not have."""
+    if not any(axis.random for axis in study.axes):
+        raise InputError(
+            "axes: none has a distribution, so that there is nothing to search; give its bounds as `uniform`"
+        )
+    if len(goals.names) < 2 or len(set(goals.names)) < len(goals.names):
+        raise InputError("pareto: give two or more different quantities to minimise or maximise")
+    check_columns((*goals.names, *goals.limits), study.keep.numbers)
+    if goals.statistic not in STATISTICS:
+        raise InputError(f"statistic = {goals.statistic!r}: give one of {', '.join(STATISTICS)}")
+    for word, value, least in (("population", population, 4), ("generations", generations, 1)):
+        if value < least:
+            raise InputError(f"{word} = {value}: give {least} or more")
 
 
 def _evaluated(study: Study, number: int, shares: Array, goals: Goals, pool: Pool, folder: Path) -> Any:
@@ -165,18 +160,18 @@ def _evaluated(study: Study, number: int, shares: Array, goals: Goals, pool: Poo
     table = {**study.table, "sampling": {"method": "listed", "values": values.tolist()}}
     place = folder / f"generation-{number:03d}"
     run_on(pool, replace(study, sampling=sampling, table=table), place)
-    wanted = list(dict.fromkeys((*goals.names, *(goals.at_most or {}))))
+    wanted = list(dict.fromkeys((*goals.names, *goals.limits)))
     rows = read_study(place, wanted)
     axes = [axis.name for axis in study.axes if axis.random]
     shape = (-1, len(values))
     reduce = STATISTICS[goals.statistic]
     statistics = {name: reduce(numbers(rows, name).reshape(shape), axis=0) for name in wanted}
-    feasible = complete(rows).reshape(shape).all(axis=0) & ~np.isnan(list(statistics.values())).any(axis=0)
-    for name, bound in (goals.at_most or {}).items():
+    ended = complete(rows).reshape(shape)
+    feasible = ended.all(axis=0) & ~np.isnan(list(statistics.values())).any(axis=0)
+    for name, bound in goals.limits.items():
         feasible &= statistics[name] <= bound
     designs = pd.DataFrame({"generation": number, **dict(zip(axes, values.T, strict=True)), **statistics})
-    designs["ended"] = complete(rows).reshape(shape).mean(axis=0)
-    designs["feasible"] = feasible
+    designs = designs.assign(ended=ended.mean(axis=0), feasible=feasible)
     designs.attrs["units"] = rows.attrs["units"]
     return designs
 
@@ -186,7 +181,7 @@ def _objectives(designs: Any, goals: Goals) -> tuple[Array, Array]:
     values = designs[list(goals.names)].to_numpy() * goals.signs
     unknown = (designs.ended < 1).to_numpy() | np.isnan(values).any(axis=1)
     violated = [1.0 - designs.ended.to_numpy()]
-    for name, bound in (goals.at_most or {}).items():
+    for name, bound in goals.limits.items():
         excess = (designs[name].to_numpy() - bound) / (abs(bound) or 1.0)
         violated.append(np.where(np.isnan(excess), LARGEST, excess))
     return np.where(unknown[:, None], LARGEST, values), np.column_stack(violated)
