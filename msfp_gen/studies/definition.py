@@ -232,36 +232,31 @@ def check_study(study: Study) -> Study:
         raise InputError(f"axes: {study.runs} runs; give at most {MOST_RUNS}")
     if study.cells is not None and study.cells.max() >= prod(study.grid):
         raise InputError(f"sampling.cells has {study.cells.max() + 1}: the axes have {prod(study.grid)} combinations")
-    with recording() as files:
-        study = _tried_study(replace(study, files=files))
+    with recording() as read:
+        with prefixed("scene: "):
+            factory = SceneFactory(study.recipe)
+        for axis in study.axes:
+            with prefixed(f"axes.{axis.name}."):
+                _check_axis(axis, factory, bool(study.recipe.records))
+        counts = Counts()
+        columns: dict[str, None] = {}
+        first, base, opened = {}, "", {}
+        for place, scene, files in _tried(study, factory):  # one after the other: their motions are long
+            if place is None:
+                first, base = files, fingerprint((scene, sorted(files.values())))
+            elif own := sorted(digest for path, digest in files.items() if path not in first):
+                opened[place] = fingerprint(own)
+            counts = counts.or_more(Counts.of(scene))
+            if study.keep.formulas:
+                history = building_dataset if isinstance(scene, BuildingScene) else dataset
+                columns |= dict.fromkeys(history.columns(scene))
+        keep = replace(study.keep, counts=counts, history=tuple(columns))
+        study = replace(study, keep=keep, files=read, base=base, opened=opened)
     reserved = [INTENSITY] if study.recipe.intensities else []
     names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in study.keep.columns)]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InputError(f"{twice[0]}: this name occurs twice among axes, keep and quantities; give another")
     return study
-
-
-def _tried_study(study: Study) -> Study:
-    """The study after all that `check_study` tries."""
-    with prefixed("scene: "):
-        factory = SceneFactory(study.recipe)
-    for axis in study.axes:
-        with prefixed(f"axes.{axis.name}."):
-            _check_axis(axis, factory, bool(study.recipe.records))
-    counts = Counts()
-    columns: dict[str, None] = {}
-    first, base, opened = {}, "", {}
-    for place, scene, files in _tried(study, factory):  # one after the other: their motions are long
-        if place is None:
-            first, base = files, fingerprint((scene, sorted(files.values())))
-        elif own := sorted(digest for path, digest in files.items() if path not in first):
-            opened[place] = fingerprint(own)
-        counts = counts.or_more(Counts.of(scene))
-        if study.keep.formulas:
-            history = building_dataset if isinstance(scene, BuildingScene) else dataset
-            columns |= dict.fromkeys(history.columns(scene))
-    keep = replace(study.keep, counts=counts, history=tuple(columns))
-    return replace(study, keep=keep, base=base, opened=opened)
 
 
 def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:

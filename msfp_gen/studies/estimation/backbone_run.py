@@ -64,7 +64,13 @@ def run_backbone(scene: AnyScene) -> BackboneRun:
     """Run a scene at the cheapest level. Raises InputError: what it is not for, as `check_backbone` says."""
     begin = time.perf_counter()
     check_backbone(scene)
-    bearings, shares, mass, stop = _parts(scene)
+    if isinstance(scene, Scene):
+        assert isinstance(scene.top, MassTop)
+        stop = 0.0 if scene.stop is None or scene.stop.displacement is None else scene.stop.displacement
+        bearings, shares, mass = [_with_rims(scene.bearing, scene.effects)], [1.0], scene.top.mass
+    else:
+        bearings = [_with_rims(one.bearing, one.effects) for one in scene.bearings]
+        shares, mass, stop = load_shares(scene), float(scene.axial_loads.sum()) / scene.gravity, 0.0
     elements, spring, gaps = _elements(tuple(bearings), tuple(shares), mass)
     stiffest = float(elements[0].sum() + spring + gaps[1].max())
     gravity = bearings[0].gravity
@@ -107,16 +113,6 @@ def check_backbone(scene: AnyScene) -> None:
         raise InputError(
             f"motion: the base rotates, which the model 'backbone' does not see; give another model, such as {other!r}"
         )
-
-
-def _parts(scene: AnyScene) -> tuple[list[Bearing], list[float], float, float]:
-    """Bearings, their shares of the load, the mass that they carry, and the displacement that ends the run."""
-    if isinstance(scene, Scene):
-        assert isinstance(scene.top, MassTop)
-        stop = 0.0 if scene.stop is None or scene.stop.displacement is None else scene.stop.displacement
-        return [_with_rims(scene.bearing, scene.effects)], [1.0], scene.top.mass, stop
-    bearings = [_with_rims(one.bearing, one.effects) for one in scene.bearings]
-    return bearings, load_shares(scene), float(scene.axial_loads.sum()) / scene.gravity, 0.0
 
 
 def _with_rims(bearing: Bearing, effects: Effects | Auto | None) -> Bearing:
