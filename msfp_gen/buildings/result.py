@@ -107,9 +107,7 @@ class BuildingResult(AnyResult):
     @property
     def drift(self) -> Array:
         """Deformation of the columns of each storey, along and about E1, E2, E3, shape (k, storeys, 6) [m], [rad]."""
-        rows = np.array([column.deformation for column in self.scene.building.columns]).reshape(-1, 6, self._size)
-        deformation: Array = np.einsum("sin,kn->ksi", rows, self.displacement)
-        return deformation
+        return self._of_storeys("deformation", self.displacement)
 
     @property
     def storey_force(self) -> Array:
@@ -117,9 +115,7 @@ class BuildingResult(AnyResult):
 
         [N], [N m]; the first two are the storey shears. Weights are not included.
         """
-        rows = np.array([column.inertia for column in self.scene.building.columns]).reshape(-1, 6, self._size)
-        force: Array = np.einsum("sin,kn->ksi", rows, self.acceleration)
-        return force
+        return self._of_storeys("inertia", self.acceleration)
 
     @property
     def corner_drift(self) -> Array:
@@ -164,9 +160,11 @@ class BuildingResult(AnyResult):
         """Energy of deformation of the building, from the place at rest, shape (k,) [J]."""
         return 0.5 * _squares(self.displacement, self.scene.building.stiffness)
 
-    @property
-    def _size(self) -> int:
-        return len(self.scene.building.mass)
+    def _of_storeys(self, name: str, motion: Array) -> Array:
+        columns = self.scene.building.columns
+        rows = np.array([getattr(one, name) for one in columns]).reshape(-1, 6, motion.shape[1])
+        values: Array = np.einsum("sin,kn->ksi", rows, motion)
+        return values
 
     @cached_property
     def energy_error(self) -> tuple[float, int]:

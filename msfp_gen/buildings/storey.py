@@ -55,8 +55,7 @@ _POINT = Quantity("m", shape=(2,))
 _INERTIA = Quantity("kg m^2", above=0.0, shape=(3,))
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
-_RIGID = [2, 3, 4]  # freedoms of a floor on rigid columns that follow the floor below
-_OWN = [0, 1, 5]  # and those that it has itself
+_OWN = [0, 1, 5]  # freedoms of a floor on rigid columns that do not follow the floor below
 
 
 @dataclass(frozen=True)

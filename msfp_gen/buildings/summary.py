@@ -14,6 +14,8 @@ from msfp_gen.results.history import by_axis
 from msfp_gen.results.loops import ForcePath, rests
 from msfp_gen.results.summary import summary_of_run
 
+Columns = dict[str, tuple[str, str, float, str]]
+
 
 def summarise(result: Any) -> dict[str, Any]:
     """Summary of a `BuildingResult`, which lists its keys."""
@@ -69,10 +71,11 @@ def work_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
     """Tables of a summary: the floors, storeys and bearings."""
-    storeys = [_storeys(summary["storeys"])] if summary["storeys"] else []
+    floors = _upwards("peaks of floors: absolute acceleration, displacement from the ground", FLOORS, summary["floors"])
+    storeys = [_upwards("peaks of storeys", STOREYS, summary["storeys"])] if summary["storeys"] else []
     bearings = summary["bearings"]
     lifted = [_uplift(bearings)] if any(bearing["uplift"]["count"] for bearing in bearings) else []
-    return [_floors(summary["floors"]), *storeys, _bearings(bearings), *lifted]
+    return [floors, *storeys, _bearings(bearings), *lifted]
 
 
 def rims_text(bearings: Sequence[Mapping[str, Any]]) -> str:
@@ -99,43 +102,35 @@ def _energy(energy: Mapping[str, float]) -> str:
     )
 
 
-def _floors(floors: Sequence[Mapping[str, Any]]) -> Table:
-    rows = [
-        (
-            floor["name"],
-            f"{floor['height']:g}",
-            *(f"{floor['peak_acceleration'][key]:.3f}" for key in ("E1", "E2", "E3")),
-            *(f"{1e3 * floor['peak_displacement'][key]:.1f}" for key in ("E1", "E2")),
-        )
-        for floor in reversed(floors)
-    ]
-    columns = ("floor", "z [m]", "a1 [m/s^2]", "a2", "a3", "u1 [mm]", "u2")
-    return Table("peaks of floors: absolute acceleration, displacement from the ground", columns, rows)
+# Column -> (key of a floor, component of it, scale, format).
+FLOORS: Columns = {
+    "floor": ("name", "", 1, ""),
+    "z [m]": ("height", "", 1, "g"),
+    "a1 [m/s^2]": ("peak_acceleration", "E1", 1, ".3f"),
+    "a2": ("peak_acceleration", "E2", 1, ".3f"),
+    "a3": ("peak_acceleration", "E3", 1, ".3f"),
+    "u1 [mm]": ("peak_displacement", "E1", 1e3, ".1f"),
+    "u2": ("peak_displacement", "E2", 1e3, ".1f"),
+}
+STOREYS: Columns = {  # likewise of a storey
+    "storey": ("name", "", 1, ""),
+    "drift 1 [mm]": ("peak_drift", "E1", 1e3, ".2f"),
+    "drift 2": ("peak_drift", "E2", 1e3, ".2f"),
+    "[% height]": ("peak_drift_ratio", "", 100, ".3f"),
+    "at corners": ("peak_corner_drift_ratio", "", 100, ".3f"),
+    "shear 1 [MN]": ("peak_shear", "E1", 1e-6, ".3f"),
+    "shear 2": ("peak_shear", "E2", 1e-6, ".3f"),
+    "torsion [MN m]": ("peak_torsion", "", 1e-6, ".3f"),
+}
 
 
-def _storeys(storeys: Sequence[Mapping[str, Any]]) -> Table:
+def _upwards(title: str, columns: Columns, parts: Sequence[Mapping[str, Any]]) -> Table:
+    """A table of floors or storeys, the highest first."""
     rows = [
-        (
-            storey["name"],
-            *(f"{1e3 * storey['peak_drift'][key]:.2f}" for key in ("E1", "E2")),
-            f"{100 * storey['peak_drift_ratio']:.3f}",
-            f"{100 * storey['peak_corner_drift_ratio']:.3f}",
-            *(f"{1e-6 * storey['peak_shear'][key]:.3f}" for key in ("E1", "E2")),
-            f"{1e-6 * storey['peak_torsion']:.3f}",
-        )
-        for storey in reversed(storeys)
+        [format((part[key][of] if of else part[key]) * scale, style) for key, of, scale, style in columns.values()]
+        for part in reversed(parts)
     ]
-    columns = (
-        "storey",
-        "drift 1 [mm]",
-        "drift 2",
-        "[% height]",
-        "at corners",
-        "shear 1 [MN]",
-        "shear 2",
-        "torsion [MN m]",
-    )
-    return Table("peaks of storeys", columns, rows)
+    return Table(title, tuple(columns), rows)
 
 
 def _bearings(bearings: Sequence[Mapping[str, Any]]) -> Table:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.figures.section import draw_circles, draw_section, peak_time
+from msfp_gen.figures.section import SectionDrawing, draw_circles, peak_time
 from msfp_gen.figures.style import (
     COLOURS,
     FAINT,
@@ -341,7 +341,7 @@ def plot_force_path(result: RunData, path: str | Path | None = None, *, time: fl
         headline(figure, label_of(result))
         ((left, right),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1, 1.7))
         axes = left.subplots()
-        draw_section(axes, then, section)
+        SectionDrawing(axes, then, section)
         draw_circles(axes, section, friction_circles(then)[0])
         _draw_offsets(right, result)
     return figure

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
@@ -29,6 +29,7 @@ from msfp_gen.figures.style import (
     subscript,
 )
 from msfp_gen.motions.records.spectrum import response_spectrum
+from msfp_gen.results.joining import interpolated
 from msfp_gen.results.sign import shown_sign
 
 if TYPE_CHECKING:
@@ -229,31 +230,16 @@ def magnification(places: Array, peak: float) -> float:
     return float(power * max(number for number in ROUND if number * power <= wanted * (1 + 1e-9)))
 
 
-@dataclass(frozen=True)
-class _Floor:
-    """The acceleration of a floor as a motion."""
-
-    time: Array
-    values: Array
-
-    @property
-    def max_step(self) -> float:
-        return 2 * float(np.diff(self.time).min())
-
-    @property
-    def duration(self) -> float:
-        return float(self.time[-1])
-
-    def acceleration(self, t: ArrayLike) -> Array:
-        return np.column_stack([np.interp(np.asarray(t), self.time, column) for column in self.values.T])
-
-
 def _spectrum(time: Array, values: Array) -> Array:
     """Pseudo-accelerations along E1, E2, E3, shape (p, 3) [m/s^2]."""
     if len(time) < 2:  # of a run that ended at its start
         return np.zeros((len(PERIODS), 3))
-    spectrum: Any = response_spectrum(_Floor(time, values), PERIODS, damping=DAMPING)
-    psa: Array = spectrum.psa[:, :3]
+    floor: Any = SimpleNamespace(
+        max_step=2 * float(np.diff(time).min()),
+        duration=float(time[-1]),
+        acceleration=partial(interpolated, time, values),
+    )
+    psa: Array = response_spectrum(floor, PERIODS, damping=DAMPING).psa[:, :3]
     return psa
 
 

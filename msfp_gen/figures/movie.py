@@ -21,7 +21,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import check_output, replacing
 from msfp_gen.figures.bearing import draw_bars, draw_orbit, moving_axes
 from msfp_gen.figures.building import MovingFrame, draw_axial_history, magnification, plan_of, title_of
-from msfp_gen.figures.section import STEEL, direction_of, draw_section, limits
+from msfp_gen.figures.section import STEEL, SectionDrawing, direction_of, limits
 from msfp_gen.figures.style import (
     BOLD,
     COLOURS,
@@ -135,7 +135,7 @@ def _layout(figure: Figure, result: RunData, frames: RunData, drawn_sections: li
     ((above,), (below,)) = figure.subfigures(2, 1, squeeze=False, height_ratios=(height - BELOW, BELOW))
     stack = above.subplots()
     left, right = below.subplots(1, 2)
-    drawing = draw_section(stack, frames, drawn_sections[0])
+    drawing = SectionDrawing(stack, frames, drawn_sections[0])
     wide, high = limits(drawn_sections)
     stack.set(xlim=wide, ylim=high)
     legend = above.legend(handles=drawing.entries, loc="outside upper center", ncols=3)
@@ -317,7 +317,9 @@ class Elevation:
         ground = float(self.frame.upper_ends[:, 2].min()) - self.frame.depth
         axes.axhline(ground, color=FAINT, linewidth=THIN, zorder=0)
         members = axes.plot([], [], color=INK, linewidth=THIN, zorder=2)[0]
-        floors = [] if self.floors is None else [_polygon(axes, corners) for corners in self.floors[0].copy()]
+        style: dict[str, Any] = {"facecolor": STEEL[1], "edgecolor": INK, "linewidth": LINE, "joinstyle": "round"}
+        corners = [] if self.floors is None else self.floors[0].copy()
+        floors = [axes.fill(*floor.T, zorder=3, **style)[0] for floor in corners]
         nodes = axes.plot([], [], "o", markersize=4, color=INK, zorder=4)[0] if self.floors is None else None
         feet = axes.plot([], [], color=INK, linewidth=BOLD, solid_capstyle="butt", zorder=3)[0]
         heads = axes.plot([], [], color=INK, linewidth=BOLD, solid_capstyle="butt", zorder=3)[0]
@@ -350,11 +352,6 @@ class Elevation:
         """Horizontal plates of the bearings, as lines."""
         half = np.array([self.plate, 0.0])
         return _joined(np.stack([places - half, places + half], axis=1))
-
-
-def _polygon(axes: Axes, corners: Array) -> Any:
-    (polygon,) = axes.fill(*corners.T, facecolor=STEEL[1], edgecolor=INK, linewidth=LINE, joinstyle="round", zorder=3)
-    return polygon
 
 
 def _joined(ends: Array) -> tuple[Array, Array]:

@@ -78,7 +78,7 @@ def plot_section(
     with page(5.6 if friction_circles else WIDTH + 1.2, tall, path) as figure:
         headline(figure, label_of(result))
         axes = figure.subplots()
-        draw_section(axes, then, section)
+        SectionDrawing(axes, then, section)
         if friction_circles:
             draw_circles(axes, section, circle_radii(then)[0])
         figure.legend(loc="outside lower center", ncols=2 if friction_circles else 3)
@@ -90,22 +90,15 @@ def peak_time(result: RunData) -> float:
     return float(result.history.time[result.history.peak_row])
 
 
-def draw_section(axes: Axes, then: RunData, section: Section, row: int = 0) -> SectionDrawing:
-    """Draw bodies, sliding faces, contact points and line of force of one row of `then` [mm]."""
-    drawing = SectionDrawing(axes, then, section)
-    drawing.update(section, row)
-    return drawing
-
-
 class SectionDrawing:
-    """The parts of a section in motion; `update` moves them to another row of `then`.
+    """Bodies, sliding faces, contact points and line of force of a row of `then` [mm]; `update` moves them to another.
 
     Attributes:
         bodies, faces, line, contacts: artists of bodies, sliding faces, line of force and contact points.
         title: title of the axes, with time and displacement.
     """
 
-    def __init__(self, axes: Axes, then: RunData, section: Section) -> None:
+    def __init__(self, axes: Axes, then: RunData, section: Section, row: int = 0) -> None:
         history, last = then.history, len(section.bodies) - 1
         self.history = history
         self.slides, self.on_rim = sliding_surfaces(history), rims_in_contact(history)
@@ -114,10 +107,16 @@ class SectionDrawing:
         for body, polygon in enumerate(section.bodies):
             steel = STEEL[0 < body < last]
             self.bodies += axes.fill(*(polygon * MILLI).T, facecolor=steel, edgecolor=INK, linewidth=HAIR)
-        self.faces = [self._face(axes, index) for index in reversed(range(history.surfaces))][::-1]
+        style: dict[str, Any] = {"solid_capstyle": "butt", "zorder": 3}
+        self.faces = [axes.plot([], [], color=colour(i + 1), **style)[0] for i in reversed(range(history.surfaces))]
+        self.faces.reverse()
         (self.line,) = axes.plot([], [], color=INK, linewidth=LINE, linestyle=(0, (6, 2)), zorder=4)
         self.line.set_label("line of force")
-        self.contacts = [self._contact(axes, index) for index in range(history.surfaces)]
+        style = {"color": "white", "markeredgewidth": LINE, "zorder": 5}
+        self.contacts = [
+            axes.plot([], [], "o", markersize=5, markeredgecolor=colour(i + 1), **style)[0]
+            for i in range(history.surfaces)
+        ]
         axes.set(
             xlabel=f"{direction_of(section.azimuth)}, from the centre of the base [mm]",
             ylabel="height above the base [mm]",
@@ -125,6 +124,7 @@ class SectionDrawing:
         self.title = axes.set_title(" ")
         axes.set_aspect("equal", adjustable="box")
         axes.grid(visible=False)
+        self.update(section, row)
 
     @property
     def artists(self) -> list[Any]:
@@ -153,24 +153,6 @@ class SectionDrawing:
         along = history.displacement[row] @ [np.cos(section.azimuth), np.sin(section.azimuth), 0.0]
         u = f"u = {shown_sign().difference} = {displacement(along):.1f} mm"
         self.title.set_text(f"t = {history.time[row]:.3f} s, {u}")
-
-    def _face(self, axes: Axes, index: int) -> Any:
-        (face,) = axes.plot([], [], color=colour(index + 1), solid_capstyle="butt", zorder=3)
-        return face
-
-    def _contact(self, axes: Axes, index: int) -> Any:
-        (contact,) = axes.plot(
-            [],
-            [],
-            marker="o",
-            markersize=5,
-            color="white",
-            markeredgecolor=colour(index + 1),
-            markeredgewidth=LINE,
-            linestyle="none",
-            zorder=5,
-        )
-        return contact
 
 
 def _force_line(section: Section) -> tuple[Array, Array]:

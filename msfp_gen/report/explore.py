@@ -10,26 +10,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.figures.style import colour
-from msfp_gen.jit.build import BuildInfo, runtime_sources
+from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS, Log, Step, zig_program
-from msfp_gen.model.model import Model
 from msfp_gen.report.frames import asset, pieces, render, script_data, write_page
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import RigTop
-from msfp_gen.simulation.start import start_run
+from msfp_gen.simulation.start import needs_settling, run_arguments
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import Effects, ModelSpec
-
-if TYPE_CHECKING:
-    from types import ModuleType
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +97,6 @@ def problem_of(scene: Scene, title: str) -> Problem:
 
 def fixed_scene(scene: Scene) -> Scene:
     """The scene with the effects at its start, and rims. Raises InputError where the page cannot run it."""
-    from msfp_gen.simulation.start import needs_settling
-
     selection = scene.effect_selection
     refused = {
         "top_rotation": scene.top_rotation is not None,
@@ -122,22 +115,6 @@ def fixed_scene(scene: Scene) -> Scene:
     return replace(scene, effects=effects)
 
 
-def run_arguments(scene: Scene, spec: ModelSpec) -> tuple[dict[str, Any], float]:
-    """What the compiled run of a scene would be given, and the azimuth of its frame [rad]; nothing is compiled."""
-    arguments: dict[str, Any] = {}
-
-    def stack(*values: Any) -> tuple[Any, ...]:
-        return values
-
-    def run(values: Any, *positional: Any, **options: Any) -> None:
-        arguments.update(stack=values, run=positional, options=options)
-
-    recorder = cast("ModuleType", SimpleNamespace(Stack=stack, Run=run))
-    model = Model(spec, recorder, cast("BuildInfo", None))
-    _, azimuth = start_run(scene, model, scene.effect_selection, scene.end, None, ())
-    return arguments, azimuth
-
-
 def _offsets(quantities: tuple[contract.Recorded, ...], surfaces: int) -> dict[str, list[int]]:
     """Name -> offset and number of values of every field; "" -> the number of all values."""
     lengths = {
@@ -145,12 +122,12 @@ def _offsets(quantities: tuple[contract.Recorded, ...], surfaces: int) -> dict[s
         contract.Extent.COORDINATES: 3,
         contract.Extent.WORKS: len(contract.WORKS),
     }
-    offsets, offset = {}, 0
-    for quantity in quantities:
-        size = int(np.prod([lengths[n] if isinstance(n, contract.Extent) else n for n in quantity.shape], dtype=int))
-        offsets[quantity.name] = [offset, size]
-        offset += size
-    return {**offsets, "": [offset, 0]}
+    shapes = [
+        (one.name, tuple(lengths[n] if isinstance(n, contract.Extent) else n for n in one.shape)) for one in quantities
+    ]
+    size = sum(int(np.prod(shape, dtype=int)) for _, shape in shapes)
+    places = parts(np.arange(size), shapes)
+    return {name: [int(place.flat[0]), place.size] for name, place in places.items()} | {"": [size, 0]}
 
 
 def _columns(coefficients: Array) -> dict[str, Any]:

@@ -44,6 +44,15 @@ DEMAND_UNITS = {
     "heat": "J/m^2",
     "maximum_uplift": "m",
 }
+# Column -> (demand on a surface, scale, format).
+DEMAND_COLUMNS = {
+    "capacity left [mm]": ("capacity_left", 1e3, ".2f"),
+    "of capacity [%]": ("capacity_left_share", 100, ".1f"),
+    "velocity [mm/s]": ("peak_velocity", 1e3, ".4g"),
+    "heat flux [kW/m2]": ("peak_heat_flux", 1e-3, ".4g"),
+    "heat [kJ/m2]": ("heat", 1e-3, ".4g"),
+    "uplift [mm]": ("maximum_uplift", 1e3, ".4g"),
+}
 TIMES = {"start [s]", "end [s]"}  # columns that have no envelope
 Row = dict[str, float | str | None]
 
@@ -184,28 +193,13 @@ class Characterisation:
 
     def demand_table(self) -> Table:
         """Table of the demands on the surfaces."""
-        columns = (
-            "surface",
-            "capacity left [mm]",
-            "of capacity [%]",
-            "velocity [mm/s]",
-            "heat flux [kW/m2]",
-            "heat [kJ/m2]",
-            "uplift [mm]",
-        )
+        columns = DEMAND_COLUMNS.values()
         rows = [
-            (
-                str(demand.surface),
-                f"{demand.capacity_left * 1e3:.2f}",
-                f"{demand.capacity_left_share * 100:.1f}",
-                _number(demand.peak_velocity, 1e3),
-                _number(demand.peak_heat_flux, 1e-3),
-                _number(demand.heat, 1e-3),
-                _number(demand.maximum_uplift, 1e3),
-            )
+            (str(demand.surface), *(_number(getattr(demand, name), scale, style) for name, scale, style in columns))
             for demand in self.surfaces
         ]
-        return Table("surfaces, bottom first: least capacity left, largest velocity, heat and uplift", columns, rows)
+        title = "surfaces, bottom first: least capacity left, largest velocity, heat and uplift"
+        return Table(title, ("surface", *DEMAND_COLUMNS), rows)
 
     def _cycle_table(self) -> Table:
         columns = ("cycle", "least u [mm]", "largest u [mm]", *(kind.heading for kind in LOOP_QUANTITIES.values()))
@@ -320,8 +314,8 @@ def _joined(surfaces: tuple[int, ...]) -> str:
     return "+".join(map(str, surfaces)) or "none"
 
 
-def _number(value: float | None, scale: float) -> str:
-    return "-" if value is None else f"{value * scale:.4g}"
+def _number(value: float | None, scale: float, style: str = ".4g") -> str:
+    return "-" if value is None else format(value * scale, style)
 
 
 NOT_RECORDED = (

@@ -12,7 +12,6 @@ import numpy as np
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.files import COUNTER, REMEDY, WORDS, attributes_of, motion_in, notes_in, without
-from msfp_gen.results.gradient import ERROR, EVENTS, Gradients, energy_terms
 from msfp_gen.results.history import (
     ENERGY,
     ENERGY_BELOW,
@@ -26,7 +25,7 @@ from msfp_gen.results.history import (
     History,
     quantities,
 )
-from msfp_gen.results.run_data import BearingData, RunData
+from msfp_gen.results.run_data import ERROR, EVENTS, BearingData, Gradients, RunData, energy_terms
 from msfp_gen.results.stored_group import Attribute, StoredGroup
 from msfp_gen.results.variables import (
     Arrays,

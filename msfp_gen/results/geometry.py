@@ -10,7 +10,6 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.history import History
 from msfp_gen.results.run_data import RunData
-from msfp_gen.results.sliding import Flags
 from msfp_gen.scene.bearing import Bearing
 
 
@@ -25,7 +24,6 @@ class Poses:
         centre: ndarray, shape (T, n-1, 3), [m]: sphere centres r_gc; with uplift, those of the sliders.
         contact: ndarray, shape (T, n-1, 3), [m]: contact points (3.14).
         rim: ndarray, shape (T, n-1, 3), [m]: point of the slider nearest to the rim (3.25); on its axis where centred.
-        at_rim: ndarray of bool, shape (T, n-1): whether the rim is in contact.
         force: ndarray, shape (T, n-1, 3), [N]: interface force on the body above; 0 while the surface is separated.
         line: ndarray, shape (T, n-1, 3), [m]: point of the line of force that is nearest to the sphere centre.
     """
@@ -37,7 +35,6 @@ class Poses:
     centre: Array
     contact: Array
     rim: Array
-    at_rim: Flags
     force: Array
     line: Array
 
@@ -62,8 +59,7 @@ def poses(result: RunData) -> Poses:
     moment = np.cross(contact - centre, force - rim_force) + np.cross(rim - centre, rim_force)
     square = np.sum(force * force, axis=-1, keepdims=True)
     line = np.divide(np.cross(force, moment), square, out=contact - centre, where=square > 0) + centre
-    at_rim = history.rim_force > 0
-    return Poses(basis, angles[..., 2], bottom, top, centre, contact, rim, at_rim, force, line)
+    return Poses(basis, angles[..., 2], bottom, top, centre, contact, rim, force, line)
 
 
 def body_bases(angles: Array) -> Array:

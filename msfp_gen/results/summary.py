@@ -13,9 +13,8 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.results.dataset import gradients_of
 from msfp_gen.results.files import ResultFiles
-from msfp_gen.results.gradient import Gradients, gradients_of_extremes
 from msfp_gen.results.history import BearingRows, History, by_axis
-from msfp_gen.results.run_data import BearingData, RunData
+from msfp_gen.results.run_data import BearingData, Gradients, RunData, gradients_of_extremes
 from msfp_gen.results.sliding import SHARE, merged, open_times, slip_shares
 from msfp_gen.scene.bearing import Surface
 from msfp_gen.scene.parameters import Parameter

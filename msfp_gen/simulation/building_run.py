@@ -27,7 +27,7 @@ from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.scene.effect_switching import Ending, monitor_options, next_effects, stopping_monitors
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
-from msfp_gen.simulation.restart_state import RestartState, transferred_heights, transferred_state
+from msfp_gen.simulation.start import RestartState, transferred_heights, transferred_state
 from msfp_gen.specification.contract import WORKS, names
 from msfp_gen.specification.layout import Auto, Effects
 

@@ -60,7 +60,6 @@ from msfp_gen.simulation.outcome import (
     provenance_of,
     stopped,
 )
-from msfp_gen.simulation.restart_state import RestartState
 from msfp_gen.simulation.rows import (
     ROWS_HELD,
     RowFile,
@@ -73,6 +72,7 @@ from msfp_gen.simulation.rows import (
     start_temperatures,
 )
 from msfp_gen.simulation.start import (
+    RestartState,
     StartSlopes,
     moves_settling,
     needs_settling,
@@ -272,11 +272,7 @@ class RunSequence:
         return run, azimuth
 
     def run_segment(
-        self,
-        progress: Progress | None = None,
-        saved: Path | None = None,
-        every: float = EVERY,
-        resume: bool = False,
+        self, progress: Progress | None = None, saved: Path | None = None, every: float = EVERY, resume: bool = False
     ) -> None:
         """Build the next model and run it to its end, add its notes, and determine the effects of the segment after it.
 

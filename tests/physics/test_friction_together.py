@@ -176,7 +176,7 @@ def test_force_line_touches_the_circle_of_the_friction_of_that_instant() -> None
     run = heated()
     where, circles = poses(run), friction_circles(run)
     distance = np.linalg.norm(where.line - where.centre, axis=-1)
-    slides = ((run.history.friction_state**2).sum(-1) > 0.999999) & ~where.at_rim
+    slides = ((run.history.friction_state**2).sum(-1) > 0.999999) & (run.history.rim_force == 0)
     assert slides.sum() > 1000
     assert distance[slides] == pytest.approx(circles[slides], rel=1e-6)
     assert np.ptp(circles, axis=0).max() > 0.2 * circles.max(), "this would not see the law"

@@ -26,8 +26,7 @@ from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
 from msfp_gen.scene.standing import seat_stiffness
-from msfp_gen.simulation.restart_state import RestartState
-from msfp_gen.simulation.start import start_run
+from msfp_gen.simulation.start import RestartState, start_run
 
 BEARING = presets.bearing("fenz-tfp")
 MASS, GRAVITY = 11e3, BEARING.gravity

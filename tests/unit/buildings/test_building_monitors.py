@@ -11,7 +11,7 @@ from msfp_gen.buildings import scene as selection
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.scene import effect_switching
 from msfp_gen.simulation.building_run import start_run
-from msfp_gen.simulation.restart_state import RestartState
+from msfp_gen.simulation.start import RestartState
 
 
 @pytest.fixture

@@ -18,10 +18,10 @@ from msfp_gen.report.explore import (
     explored_scene,
     fixed_scene,
     problem_of,
-    run_arguments,
     write_explorer,
 )
 from msfp_gen.results.loops import REVERSAL, closed_cycles, effective_properties, turning_points
+from msfp_gen.simulation.start import run_arguments
 from tests.support.explorer_page import CHROMIUM, DRIVER, SLIDE, act, choose_preset, explorer_in_browser
 
 pytestmark = [

@@ -33,8 +33,8 @@ from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation import simulate as simulation
-from msfp_gen.simulation.restart_state import RestartState
 from msfp_gen.simulation.simulate import RunSequence
+from msfp_gen.simulation.start import RestartState
 
 FULL = Effects()
 STILL = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, ORDER)))
