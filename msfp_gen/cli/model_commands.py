@@ -216,9 +216,10 @@ def export(
 
 
 def _export_rows(source: str, output: Path, columns: str | None, sign: str) -> None:
-    from msfp_gen.results.files import TABLE_WRITERS, export_columns
+    from msfp_gen.common.tables import TABLE_SUFFIXES
+    from msfp_gen.results.files import export_columns
 
-    check_output(output, TABLE_WRITERS, "--output")
+    check_output(output, TABLE_SUFFIXES, "--output")
     names = None if columns is None else [name.strip() for name in columns.split(",")]
     sign_of(sign, "--sign")
     loaded = load_source(source)

@@ -81,14 +81,8 @@ class TitleBlock:
 
     def rows(self, device: str) -> list[tuple[str, str]]:
         """Names and texts of the entries that are given, the device in any case; `device`: its kind."""
-        entries = {
-            "project": self.project,
-            "device": self.device or device,
-            "date": self.date,
-            "revision": self.revision,
-            "code edition": self.code,
-        }
-        return [(name, text) for name, text in entries.items() if text]
+        entries = vars(self) | {"device": self.device or device}
+        return [("code edition" if name == "code" else name, text) for name, text in entries.items() if text]
 
 
 def kind_of(bearing: Bearing) -> str:

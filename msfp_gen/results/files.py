@@ -22,7 +22,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output, replacing, write_bytes
-from msfp_gen.common.tables import parquet_bytes
+from msfp_gen.common.tables import TABLE_SUFFIXES, parquet_bytes
 from msfp_gen.motions.motion import Motion
 from msfp_gen.results.note import Note
 from msfp_gen.results.sign import DEFAULT, VARIABLES, sign_of
@@ -214,11 +214,7 @@ class ResultFiles:
         return read_result(path, cls)
 
 
-TABLE_WRITERS: dict[str, Callable[[Any, str | Path, Sequence[str] | None, str], Path]] = {
-    ".csv": ResultFiles.to_csv,
-    ".parquet": ResultFiles.to_parquet,
-}
-WRITERS: dict[str, Callable[[Any, str | Path], Path]] = {
+WRITERS: dict[str, Callable[..., Path]] = {
     ".nc": ResultFiles.to_netcdf,
     ".parquet": ResultFiles.to_parquet,
     ".csv": ResultFiles.to_csv,
@@ -243,8 +239,8 @@ def export_columns(
     order in which they are written; None: all. sign: of displacement and force across the bearing, a word of
     `sign.SIGNS`. Raises InputError for another name, another sign or an invalid path.
     """
-    target = check_output(path, TABLE_WRITERS, "output")
-    return TABLE_WRITERS[target.suffix.lower()](result, target, names, sign)
+    target = check_output(path, TABLE_SUFFIXES, "output")
+    return WRITERS[target.suffix.lower()](result, target, names, sign)
 
 
 class Column(NamedTuple):

@@ -32,7 +32,6 @@ from msfp_gen.scene.top import is_sprung, load_values
 from msfp_gen.simulation.rows import Segment, unpacked
 from msfp_gen.simulation.start import (
     Frame,
-    StartSlopes,
     first_load,
     needs_settling,
     state_in_plane,
@@ -54,16 +53,16 @@ def start_gradients(
     parameters: Sequence[Parameter],
     steps: Sequence[float] = (),
     energies: bool = False,
-    start: StartSlopes | None = None,
+    start: tuple[Array, Array] | None = None,
 ) -> None:
     """Begin the derivatives of a run that has taken no step.
 
     steps: ends of all steps [s], in place of the step control, for differences with the same steps. energies: also of
-    the energies that are integrals over the run. start: derivatives of the initial state; None: it is constant. Raises
-    InputError where a parameter leads out of the plane of a planar model.
+    the energies that are integrals over the run. start: derivatives of the initial state, as of `start_slopes`; None:
+    it is constant. Raises InputError where a parameter leads out of the plane of a planar model.
     """
     inputs = [
-        _Inputs(scene, model, parameter, None if start is None else (start.q[i], start.h[i])).arrays
+        _Inputs(scene, model, parameter, None if start is None else (start[0][i], start[1][i])).arrays
         for i, parameter in enumerate(parameters)
     ]
     histories = {

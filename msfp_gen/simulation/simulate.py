@@ -16,6 +16,7 @@ from typing import Any, overload
 from msfp_gen.buildings.dataset import scene_text
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output
@@ -73,7 +74,6 @@ from msfp_gen.simulation.rows import (
 )
 from msfp_gen.simulation.start import (
     RestartState,
-    StartSlopes,
     moves_settling,
     needs_settling,
     settling_scene,
@@ -238,7 +238,7 @@ class RunSequence:
     scene: that of the user. settled: the same with the initial state after settling. effects: of the next segment;
     None: the run has ended. notes: those of the segments that have ended. stream: the file to which all rows go.
     parameters: of the derivatives; energies: whether these include energies that are integrals over the run. start: the
-    derivatives of the state after settling; None: the run starts as the scene says.
+    derivatives of the state after settling, as of `start_slopes`; None: the run starts as the scene says.
     """
 
     scene: Scene
@@ -250,7 +250,7 @@ class RunSequence:
     stream: Path | None = None
     parameters: tuple[Parameter, ...] = ()
     energies: bool = False
-    start: StartSlopes | None = None
+    start: tuple[Array, Array] | None = None
 
     @classmethod
     def of(cls, scene: Scene, strict: bool = False, parameters: tuple[Parameter, ...] = ()) -> RunSequence:
@@ -342,11 +342,11 @@ def state_at_start(scene: Scene, strict: bool = False) -> Result:
     return sequence.result(with_initial_row=True)
 
 
-def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, StartSlopes | None]:
+def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, tuple[Array, Array] | None]:
     """A scene whose plates are tilted at the start, with the initial state after a slow tilting; others unchanged.
 
-    Returns the derivatives of that state too; None: the run starts as the scene says. Raises RunError where the tilting
-    fails.
+    Returns the derivatives of that state too, as of `start_slopes`; None: the run starts as the scene says. Raises
+    RunError where the tilting fails.
     """
     if not needs_settling(scene):
         return scene, None

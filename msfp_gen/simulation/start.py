@@ -350,18 +350,6 @@ def _settling_effects(scene: Scene) -> Auto:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class StartSlopes:
-    """Derivatives of the state after settling with respect to k parameters.
-
-    q: of the angles, shape (k, n-1, 3) [rad per unit of the parameter]. h: of the friction state, shape
-    (k, n-1, 2) [per unit of the parameter].
-    """
-
-    q: Array
-    h: Array
-
-
 def moves_settling(parameter: Parameter, settling: Scene) -> bool:
     """Whether the state after settling may depend on a parameter.
 
@@ -372,21 +360,25 @@ def moves_settling(parameter: Parameter, settling: Scene) -> bool:
     return parameter.part != "motion"
 
 
-def start_slopes(history: History, gradients: Gradients | None, parameters: Sequence[Parameter]) -> StartSlopes:
-    """The derivatives of the state in which settling ended, of those parameters for which it has them."""
+def start_slopes(history: History, gradients: Gradients | None, parameters: Sequence[Parameter]) -> tuple[Array, Array]:
+    """The derivatives of the state in which settling ended, by k parameters; zero by those that do not move it.
+
+    Of the angles, shape (k, n-1, 3) [rad per unit of the parameter], and of the friction state, shape (k, n-1, 2) [per
+    unit of the parameter].
+    """
     surfaces = history.tilt_angles.shape[1]
-    slopes = StartSlopes(np.zeros((len(parameters), surfaces, 3)), np.zeros((len(parameters), surfaces, 2)))
+    dq, dh = np.zeros((len(parameters), surfaces, 3)), np.zeros((len(parameters), surfaces, 2))
     if gradients is None:
-        return slopes
+        return dq, dh
     known = {parameter.path for parameter in gradients.parameters}
     moving = [parameter.path in known for parameter in parameters]
-    slopes.q[moving] = gradients.arrays["tilt_angles"][:, -1]
-    h, dh = history.friction_state[-1], gradients.arrays["friction_state"][:, -1]
+    dq[moving] = gradients.arrays["tilt_angles"][:, -1]
+    h, slope = history.friction_state[-1], gradients.arrays["friction_state"][:, -1]
     size = np.linalg.norm(h, axis=1, keepdims=True)
-    along = (h * dh).sum(axis=2, keepdims=True) / np.maximum(1.0, size**2)
+    along = (h * slope).sum(axis=2, keepdims=True) / np.maximum(1.0, size**2)
     # `state_at_rest` limits the size of h to 1.
-    slopes.h[moving] = np.where(size > 1.0, (dh - h * along) / np.maximum(1.0, size), dh)
-    return slopes
+    dh[moving] = np.where(size > 1.0, (slope - h * along) / np.maximum(1.0, size), slope)
+    return dq, dh
 
 
 def state_at_rest(q: Array, h: Array) -> InitialState:
