@@ -291,7 +291,8 @@ class BearingResult(OneBearing):
 
     building: the whole result, of which scene, status, message and provenance are. index: of the bearing, from 0.
     history: its rows, with base_displacement of the ground below it, and displacement across it and its interface;
-    top_moment is about its upper end.
+    top_moment is about its upper end. bearing: its values. effects: of its model at the start. axial_load: compression
+    at rest [N]. events: none, as the run of a building does not record them.
     """
 
     source: ClassVar[str] = "msfp-gen bearing"
@@ -302,6 +303,10 @@ class BearingResult(OneBearing):
     status: str
     message: str
     provenance: dict[str, str]
+    bearing: Bearing
+    effects: Effects
+    axial_load: float
+    events: tuple[Event, ...] = ()
 
     @classmethod
     def of(cls, building: BuildingResult, index: int) -> BearingResult:
@@ -322,17 +327,8 @@ class BearingResult(OneBearing):
             energy={name: getattr(building, name)[:, index] for name in ENERGY_BELOW},
             **rows,
         )
-        return cls(building, index, history, scene, building.status, building.message, building.provenance)
-
-    @property
-    def bearing(self) -> Bearing:
-        """Its values."""
-        return self.scene.bearings[self.index].bearing
-
-    @property
-    def effects(self) -> Effects:
-        """The effects of its model at the start."""
-        return self.scene.modelled[self.index]
+        whole = (scene, building.status, building.message, building.provenance)
+        return cls(building, index, history, *whole, bearing, scene.modelled[index], float(scene.axial_loads[index]))
 
     @property
     def number(self) -> int:
@@ -348,16 +344,6 @@ class BearingResult(OneBearing):
     def title(self) -> str:
         """The label, and the name of the building."""
         return f"{self.label} of {self.building.title}"
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """None: the run of a building does not record them."""
-        return ()
-
-    @property
-    def axial_load(self) -> float:
-        """Compression at rest [N]."""
-        return float(self.scene.axial_loads[self.index])
 
     @property
     def notes(self) -> tuple[Note, ...]:
