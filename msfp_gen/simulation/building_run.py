@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import reduce
 from typing import Any, NamedTuple, Protocol, Self
 
@@ -47,14 +47,9 @@ class Change:
     build: str
     notes: tuple[Note, ...]
 
-    @property
-    def table(self) -> dict[str, Any]:
-        """As plain data."""
-        return {**vars(self), "notes": [vars(note) for note in self.notes]}
-
     @classmethod
     def of_table(cls, table: dict[str, Any]) -> Change:
-        """The inverse of `table`."""
+        """The inverse of `asdict`."""
         return cls(**{**table, "notes": tuple(Note(**note) for note in table["notes"])})
 
 
@@ -216,7 +211,7 @@ class BuildingRun:
 
     def snapshot(self) -> bytes:
         """State with all rows and all changes of models."""
-        return json.dumps([change.table for change in self.changes]).encode() + b"\n" + self.run.snapshot()
+        return json.dumps(list(map(asdict, self.changes))).encode() + b"\n" + self.run.snapshot()
 
     def restore(self, snapshot: bytes) -> None:
         """Continue, before the first step, from a snapshot of a run of the same scene. Raises ValueError."""
