@@ -168,26 +168,20 @@ class Method:
             return trial if isinstance(error, InputError) else replace(trial, status=error.status or "failed")
 
 
-def _native(name: str, family: str) -> Method:
-    return Method(name, family, partial(run_native, name))
-
-
-def _library(name: str) -> Method:
-    return Method(name, name, partial(run_library, name))
-
-
-METHODS: dict[str, Method] = {
-    method.name: method
-    for method in (
-        _native("implicit", "implicit"),  # the default: TR-BDF2, order 2, L-stable
-        _native("esdirk4", "implicit"),  # ESDIRK4(3), order 4, L-stable: the same condensed equations and Newton steps
-        _native("dopri5", "dopri5"),  # PEER 2017/07: Dormand-Prince 5(4), Newton on all 6(n-1) balances
-        _library("Radau"),  # SciPy's: Radau IIA, order 5, L-stable
-        _library("BDF"),  # backward differences, orders 1 to 5
-        _library("LSODA"),  # Adams and backward differences, switching
-        _library("DOP853"),  # Dormand-Prince 8(5,3), explicit
-    )
+# Method of the compiled runtime -> its family.
+NATIVE = {
+    "implicit": "implicit",  # the default: TR-BDF2, order 2, L-stable
+    "esdirk4": "implicit",  # ESDIRK4(3), order 4, L-stable: the same condensed equations and Newton steps
+    "dopri5": "dopri5",  # PEER 2017/07: Dormand-Prince 5(4), Newton on all 6(n-1) balances
 }
+LIBRARY = (
+    "Radau",  # Radau IIA, order 5, L-stable
+    "BDF",  # backward differences, orders 1 to 5
+    "LSODA",  # Adams and backward differences, switching
+    "DOP853",  # Dormand-Prince 8(5,3), explicit
+)  # of SciPy, each a family of its own
+METHODS = {name: Method(name, family, partial(run_native, name)) for name, family in NATIVE.items()}
+METHODS |= {name: Method(name, name, partial(run_library, name)) for name in LIBRARY}
 
 
 def methods_named(names: list[str] | None) -> list[Method]:

@@ -161,8 +161,7 @@ class Bounds:
 
 
 def bound(scene: AnyScene, table: FactorTable, *, progress: Progress | None = None) -> Bounds:
-    """Run `scene` with its properties at their lower bounds, nominal values and upper bounds; of a
-    building those of all bearings.
+    """Run `scene` at lower bounds, nominal values and upper bounds of its properties; of a building of all bearings.
 
     A case that fails is part of the result, and the other cases are run. All cases have the same effects: where `Auto`
     ends with different ones, they are run again with what any of them needs.
@@ -304,11 +303,7 @@ SHOWN = {
     "": ("%", 100.0),
 }
 # In the order of drawing: the nominal loop lies on top. Solid lines, since repeated cycles would fill dashes.
-LINE_STYLES: dict[str, dict[str, Any]] = {
-    "lower": {"color": COLOURS[0]},
-    "upper": {"color": COLOURS[1]},
-    "nominal": {"color": INK},
-}
+LINE_COLOURS = {"lower": COLOURS[0], "upper": COLOURS[1], "nominal": INK}
 
 
 def shown_as(unit: str) -> tuple[str, float]:
@@ -395,7 +390,7 @@ def plot_bounds(bounds: Bounds, path: str | Path | None = None) -> Figure:
     A run that failed is drawn up to its last row, one without rows is left out. Raises InputError for a path that
     cannot be written.
     """
-    drawn = [case for name in LINE_STYLES for case in bounds.cases if case.name == name and case.result is not None]
+    drawn = [case for name in LINE_COLOURS for case in bounds.cases if case.name == name and case.result is not None]
     axes = sorted({axis for case in drawn for axis in axes_along(_loop(case.result)[0])}) or [0]
     with page(6.4 * len(axes), 5.0, path, "bounds") as figure:
         name = next(case.scene.name for case in bounds.cases if case.name == "nominal") or "unnamed scene"
@@ -410,7 +405,7 @@ def _draw(axes: Axes, bounds: Bounds, cases: list[Case], axis: int) -> None:
     forces = [force[:, axis] for _, force in loops]
     scale = engineering(np.concatenate(forces), "N") if forces else engineering(0.0, "N")
     for case, (u, _), values in zip(cases, loops, forces, strict=True):
-        style = {"label": _label(bounds, case), "linewidth": THIN, **LINE_STYLES[case.name]}
+        style: dict[str, Any] = {"color": LINE_COLOURS[case.name], "linewidth": THIN, "label": _label(bounds, case)}
         axes.plot(displacement(u[:, axis]), force(values, scale), **style)
     sign = subscript(axis + 1)
     axes.set(
