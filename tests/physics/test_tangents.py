@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support import bearing_of, model_of
+from support.friction_scenes import VALUES
 from support.random_states import sensible
 
 from msfp_gen import Top
@@ -41,7 +42,7 @@ def tangents(layout: tuple[int, int, int], effects: dict[str, object]) -> list[n
     found = []
     for seed, met in ((7, False), (8, True)):
         values, state, h, load = sensible(layout, seed)
-        bearing = bearing_of(values)
+        bearing = bearing_of(values).replace(**VALUES.get(effects.get("friction", ""), {}))
         if met:
             bearing = bearing.replace(capacity=[1e-4] * (layout[0] - 1))
         q, v, a = (np.ascontiguousarray(x * keep) for x in (state.q, state.v, state.a))
