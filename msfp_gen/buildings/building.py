@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from msfp_gen.buildings.storey import FREEDOMS, MOTIONS, BaseSlab, Columns, Node, Storey, frame, rigid
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, MsfpError
-from msfp_gen.common.fields import require_type
+from msfp_gen.common.fields import LARGEST, require_type
 from msfp_gen.common.inputs import read_input
 
 Indices = NDArray[np.intp]
@@ -337,14 +337,16 @@ def matrix_of(source: Matrix, name: str) -> Array:
     path = f"building.{name}"
     values = _read(Path(source), path, name) if isinstance(source, str | PathLike) else source
     try:
+        if np.iscomplexobj(values):
+            raise TypeError
         matrix = np.array(values.toarray() if hasattr(values, "toarray") else values, dtype=float)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{path}: these are no numbers; give a square array or the path of a file") from None
+        raise InputError(f"{path}: these are no real numbers; give a square array or the path of a file") from None
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not 0 < len(matrix) <= MOST:
         raise InputError(f"{path} has the shape {matrix.shape}: give a square matrix of 1 to {MOST} coordinates")
-    if not np.all(np.isfinite(matrix)):
-        row, column = np.argwhere(~np.isfinite(matrix))[0]
-        raise InputError(f"{path}[{row}, {column}] = {matrix[row, column]}: give finite numbers")
+    if not np.all(np.abs(matrix) <= LARGEST):
+        row, column = np.argwhere(~(np.abs(matrix) <= LARGEST))[0]
+        raise InputError(f"{path}[{row}, {column}] = {matrix[row, column]}: give finite numbers up to {LARGEST:g}")
     difference = np.abs(matrix - matrix.T)
     if difference.max() > SYMMETRY * np.abs(matrix).max():
         row, column = np.unravel_index(int(difference.argmax()), matrix.shape)

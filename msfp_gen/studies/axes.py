@@ -192,7 +192,7 @@ def values_at(shares: Array, distributions: Sequence[Distribution]) -> Array:
 def distribution_from(table: Mapping[str, Any]) -> tuple[Distribution, set[str]]:
     """The distribution of the table of an axis, and the keys that it takes. Raises InputError."""
     kind = table["distribution"]
-    if kind not in DISTRIBUTIONS:
+    if not isinstance(kind, str) or kind not in DISTRIBUTIONS:
         raise InputError(f"distribution = {kind!r}: give one of {', '.join(map(repr, DISTRIBUTIONS))}")
     names = DISTRIBUTIONS[kind]
     if missing := [name for name in names if name not in table]:

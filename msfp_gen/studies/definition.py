@@ -23,7 +23,7 @@ from msfp_gen.common.inputs import Files, expecting, is_input, recording
 from msfp_gen.results import dataset
 from msfp_gen.scene.file.catalogue import known_keys, parsed
 from msfp_gen.scene.file.changes import multiplied_table
-from msfp_gen.scene.file.loader import Suite, load_suite, scene_table, suite_from_table, toml_file
+from msfp_gen.scene.file.loader import Suite, check_table, load_suite, scene_table, suite_from_table, toml_file
 from msfp_gen.studies.axes import (
     INTENSITY,
     Axis,
@@ -36,7 +36,7 @@ from msfp_gen.studies.axes import (
     motion_of,
 )
 from msfp_gen.studies.batch import check_method
-from msfp_gen.studies.bounding.factors import check_numbers, load_factors
+from msfp_gen.studies.bounding.factors import load_factors
 from msfp_gen.studies.columns import Counts, Keep
 
 if TYPE_CHECKING:
@@ -411,7 +411,7 @@ def _for_search(table: Mapping[str, Any]) -> Table:
 
 
 def _study(table: Mapping[str, Any], folder: Path | None, progress: Progress | None, design: bool) -> Study:
-    check_numbers(table)
+    check_table(table)
     table = _for_search(table) if design else table
     known_keys(table, KEYS, "")
     if "scene" not in table:

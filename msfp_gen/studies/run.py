@@ -388,7 +388,9 @@ def study_table(folder: Path) -> dict[str, Any]:
     try:
         table = toml_file(folder / STUDY_FILE)
         counts = {key: int(table["about"][key]) for key in ("runs", "chunk", "samples")}
-    except (InputError, KeyError, TypeError, ValueError) as error:
+        if min(counts["runs"], counts["chunk"]) < 1:
+            raise ValueError("runs and chunk are above 0")
+    except (InputError, KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{folder / STUDY_FILE}: not written by msfp-gen ({error}); run the study again") from None
     return {**table, "about": {**table["about"], **counts}}
 

@@ -118,8 +118,6 @@ def read_measurement(
     header = [text.strip().strip('"') for text in lines[head].split(mark)]
     places = {name: _place(lines, head, header, name, (columns or {}).get(name, name)) for name in UNITS}
     rows = _rows(lines, head, mark, header, places)
-    if not rows:
-        lines.fail(head, "no rows of numbers after the header")
     values = dict(zip(UNITS, np.array(rows).T * [[factor] for _, factor in places.values()], strict=True))
     return Measurement(Path(path).name, **values, axial_load=axial_load, weight=weight)
 
@@ -141,6 +139,8 @@ def _rows(
         if len(rows) > 1 and rows[-1][0] <= rows[-2][0]:
             at = places["time"][0]
             lines.fail(index, f"column {header[at]!r}: {cells[at].strip()} does not increase; sort or cut the data")
+    if not rows:
+        lines.fail(head, "no rows of numbers after the header")
     lines.check_end(end, last)
     return rows
 

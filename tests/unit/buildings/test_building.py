@@ -240,7 +240,9 @@ def test_messages_of_bad_files(tmp_path: Path):
         (tmp_path / "damaged.mtx", "check the file"),
         (tmp_path / "frame.txt", "give a file of Matrix Market"),
         ("words", "give a file of Matrix Market"),
-        ([["a"]], "these are no numbers"),
+        ([["a"]], "these are no real numbers"),
+        (1j * np.eye(9), "these are no real numbers"),
+        (-1e200 * np.eye(9), r"building\.stiffness\[0, 0\] = -1e\+200: give finite numbers up to 1e\+30"),
         (np.eye(3)[:2], r"has the shape \(2, 3\)"),
         (np.eye(3), "building.stiffness has 3 rows: building.mass has 9"),
     ):

@@ -206,6 +206,14 @@ def test_a_file_that_ends_inside_its_last_number_is_refused(tmp_path: Path) -> N
         read_measurement(path)
 
 
+@pytest.mark.parametrize("end", ["", "\n"])
+def test_a_header_alone_is_refused(tmp_path: Path, end: str) -> None:
+    path = tmp_path / "test.csv"
+    path.write_text(HEADER + end, encoding="utf-8")
+    with pytest.raises(InputError, match=r"test\.csv, line 1: no rows of numbers after the header"):
+        read_measurement(path)
+
+
 def test_tests_that_cannot_be_fitted_are_refused() -> None:
     test = measured(0.05)
     for changes, message in (

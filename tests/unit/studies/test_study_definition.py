@@ -239,7 +239,7 @@ def test_the_example_is_a_study_of_a_few_hundred_runs(tmp_path: Any) -> None:
 
 
 WRONG = {
-    "digits": ({"axes": {"mu": {"sets": "bearing.friction", "values": [16**4000]}}}, "thousands of digits"),
+    "digits": ({"axes": {"mu": {"sets": "bearing.friction", "values": [16**4000]}}}, "more than 64 bits"),
     "scene is missing": ({"scene": None}, "scene is missing"),
     "no such scene": ({"scene": "fenz-tset1"}, "did you mean|no such file"),
     "unknown key": ({"axis": {}}, "axis: unknown key; did you mean 'axes'"),
@@ -261,6 +261,10 @@ WRONG = {
     "low above high": (
         {"axes": {"a": {"multiplies": "bearing.friction", "distribution": "uniform", "low": 2, "high": 1}}},
         "axes.a.2.0, 1.0: give low < high",
+    ),
+    "no word of a distribution": (
+        {"axes": {"a": {"multiplies": "bearing.friction", "distribution": ["normal"]}}},
+        "axes.a.distribution = .'normal'.: give one of 'uniform'",
     ),
     "unknown distribution": (
         {"axes": {"a": {"multiplies": "bearing.friction", "distribution": "gumbel"}}},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import random
+import re
 import threading
 import time
 from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
@@ -246,6 +247,11 @@ def test_status_says_how_far_and_how_fast(tmp_path: Path) -> None:
     assert found.rate == pytest.approx(0.5) and found.seconds_left == pytest.approx(12) and found.running
     with pytest.raises(InputError, match=r"no study.toml here; give the folder of a study"):
         study_status(tmp_path / "nothing")
+    text = (tmp_path / "study.toml").read_text(encoding="utf-8")
+    for chunk in ("0", "inf", "'two'"):
+        (tmp_path / "study.toml").write_text(re.sub(r"(?m)^chunk = .*$", f"chunk = {chunk}", text), encoding="utf-8")
+        with pytest.raises(InputError, match="not written by msfp-gen"):
+            study_status(tmp_path)
 
 
 def test_the_rate_is_that_of_the_study_where_chunks_end_in_bunches(tmp_path: Path) -> None:
