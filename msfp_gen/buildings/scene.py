@@ -12,7 +12,7 @@ import numpy as np
 from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.storey import Node
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.errors import InputError
+from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
 from msfp_gen.common.identity import NO_NUMBERS
 from msfp_gen.motions.motion import Motion
@@ -289,10 +289,8 @@ class BuildingScene:
     def _node(self, index: int) -> Node:
         """The node to which a bearing is attached. Raises InputError: there is none, or it carries no bearing."""
         name = self.bearings[index].node
-        try:
+        with prefixed(f"scene.bearings[{index}]."):
             node = self.building.node(name)
-        except InputError as error:
-            raise InputError(f"scene.bearings[{index}].{error}") from None
         if not node.carries:
             raise InputError(f"scene.bearings[{index}].node = {name!r}: no bearing can be attached there")
         return node
@@ -349,10 +347,8 @@ def _selected(scene: BuildingScene, index: int, remaining: float) -> EffectSelec
         Reason(reason.effect, value, GIVEN) if (value := getattr(requested, reason.effect)) is not None else reason
         for reason in _reasons(mount.bearing, requested, remaining)
     )
-    try:
+    with prefixed(f"scene.bearings[{index}]."):
         effects = requested.resolve(**{reason.effect: reason.chosen for reason in reasons})
-    except InputError as error:
-        raise InputError(f"scene.bearings[{index}].{error}") from None
     return EffectSelection(effects, reasons, error=requested.error)
 
 

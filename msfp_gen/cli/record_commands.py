@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import Progress, note, note_written, number, show
-from msfp_gen.common.errors import InputError
+from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 
 if TYPE_CHECKING:
@@ -138,10 +138,8 @@ def _read(files: list[str]) -> Record:
 def _turned(raw: Record, components: str | None, degrees: float | None) -> Record:
     """The record with the chosen components, rotated."""
     if components is not None:
-        try:
+        with prefixed("--"):
             raw = raw.with_components([name.strip() for name in components.split(",")])
-        except InputError as error:
-            raise InputError(f"--{error}") from None
     return raw if degrees is None else raw.rotated(math.radians(degrees))
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.common.errors import InputError
+from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, errors_at, ruled_fields
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.friction_parameters import law_parameters
@@ -83,13 +83,11 @@ def parameters_of(scene: Scene, paths: Sequence[str], name: str = "gradients") -
         raise InputError(f"{name} = {paths!r}: give a list of paths, such as ['bearing.surfaces[*].friction']")
     parameters: dict[str, Parameter] = {}
     for text in paths:
-        try:
+        with prefixed(f"{name} = {text!r}: "):
             for parameter in _parameters(scene, text):
                 if parameter.path in parameters:
                     raise InputError(f"{parameter.path} is given twice; give each parameter once")
                 parameters[parameter.path] = parameter
-        except InputError as error:
-            raise InputError(f"{name} = {text!r}: {error}") from None
     return tuple(parameters.values())
 
 

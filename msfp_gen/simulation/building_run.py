@@ -16,7 +16,7 @@ from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.cores import usable_cores
-from msfp_gen.common.errors import InputError
+from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.embedding.two_port import DISSIPATED, compiled_port, scene_at_rest
 from msfp_gen.jit.build import load_driver
 from msfp_gen.model.compiled import AnyRun, Port
@@ -93,10 +93,8 @@ class Member:
         """A bearing of a building at rest, from 0, with a model of these effects. Raises InputError."""
         mount, load, solver = scene.bearings[index], float(scene.axial_loads[index]), scene.solver
         asked = Asked(Auto() if mount.effects is None else mount.effects, solver, scene.end)
-        try:
+        with prefixed(f"scene.bearings[{index}]: "):
             rest = scene_at_rest(mount.bearing, mount.interface, load, effects, solver)
-        except InputError as error:
-            raise InputError(f"scene.bearings[{index}]: {error}") from None
         model = build_model(mount.bearing.layout, rest.modelled)
         stops = stopping_monitors(asked, effects, strict=False)
         options = monitor_options(rest, effects, scene.effect_selections[index], stops, noted=("uplift",))

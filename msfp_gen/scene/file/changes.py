@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping
 from copy import copy, deepcopy
 from typing import Any, NamedTuple
 
-from msfp_gen.common.errors import InputError
+from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, ruled_fields
 from msfp_gen.scene.bearing import Body, Surface
 from msfp_gen.scene.file.loader import MAX_DEPTH, complete_bearing, complete_part
@@ -65,13 +65,11 @@ def multiplied_table(
     """A copy of a table with the numbers at a path multiplied; arguments and errors as of `changed_table`."""
     changed = dict(table)
     part = path.partition(".")[0]
-    try:
+    with prefixed(f"{path}: "):
         if part in ("top", "solver"):
             changed[part] = complete_part(part, changed.get(part, {}))
         for holder, key, _ in _places(_Walk(changed, True, surfaces), path):
             holder[key] = _times(holder.get(key) if isinstance(holder, dict) else holder[key], factor)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
     return changed
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.common.errors import InputError
+from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import errors_at, ruled_fields
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Kept, is_input, read_input
@@ -64,10 +64,8 @@ def scene_table(source: str | Path) -> tuple[Table, Path | None]:
         known = [*catalogue.descriptions("scene"), *catalogue.descriptions("building")]
         hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
         raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
-    try:
+    with prefixed(f"{path}: "):
         return toml_file(path), path
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
 
 
 def toml_file(path: Path) -> Table:
@@ -308,10 +306,8 @@ def load_suite(path: str | Path, progress: Callable[[float, float], None] | None
     path = Path(path)
     if not is_input(path):
         raise InputError(f"suite = {str(path)!r}: no such file; give the path of a TOML file with [[records]]")
-    try:
+    with prefixed(f"{path}: "):
         return suite_from_table(toml_file(path), path.parent, progress)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
 
 
 def suite_from_table(

@@ -1,5 +1,5 @@
 // Numbers of a run: displacement, force, the last closed cycle, sliding regimes. The definitions are those of the package:
-// analysis/loops.py and results/sliding.py.
+// results/loops.py and results/sliding.py.
 "use strict";
 
 const REVERSAL = 0.02;
