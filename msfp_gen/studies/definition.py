@@ -21,9 +21,9 @@ from msfp_gen.common.fields import Choice, Quantity, check_fields, ruled_fields
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Files, expecting, is_input, recording
 from msfp_gen.results import dataset
-from msfp_gen.scene.file.catalogue import known_keys, parsed
+from msfp_gen.scene.file.catalogue import check_whole_numbers, known_keys, parsed
 from msfp_gen.scene.file.changes import multiplied_table
-from msfp_gen.scene.file.loader import Suite, check_table, load_suite, scene_table, suite_from_table, toml_file
+from msfp_gen.scene.file.loader import Suite, load_suite, scene_table, suite_from_table, toml_file
 from msfp_gen.studies.axes import (
     INTENSITY,
     Axis,
@@ -411,7 +411,7 @@ def _for_search(table: Mapping[str, Any]) -> Table:
 
 
 def _study(table: Mapping[str, Any], folder: Path | None, progress: Progress | None, design: bool) -> Study:
-    check_table(table)
+    check_whole_numbers(table)
     table = _for_search(table) if design else table
     known_keys(table, KEYS, "")
     if "scene" not in table:

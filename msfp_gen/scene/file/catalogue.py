@@ -56,6 +56,22 @@ def known_keys(table: Mapping[str, Any], keys: Iterable[str], where: str) -> Non
             raise InputError(f"{where}{key}: unknown key{hint}")
 
 
+def check_whole_numbers(table: Mapping[str, Any]) -> None:
+    """Raise InputError for a whole number of more than 64 bits, which TOML does not have.
+
+    Python makes no float of some of them, and writes some into no message.
+    """
+    parts: list[tuple[str, Any]] = [("", table)]
+    while parts:
+        path, part = parts.pop()
+        if isinstance(part, int) and not -(2**63) <= part < 2**63:
+            raise InputError(f"{path}: a whole number has more than 64 bits; give a shorter one")
+        if isinstance(part, Mapping):
+            parts += [(f"{path}.{key}".lstrip("."), value) for key, value in part.items()]
+        elif isinstance(part, list):
+            parts += [(f"{path}[{index}]", value) for index, value in enumerate(part)]
+
+
 def parsed(rule: Rule, value: object, path: str) -> Any:
     """A value by a rule of `common.fields`. Raises InputError that names its path."""
     try:

@@ -79,30 +79,20 @@ def toml_file(path: Path) -> Table:
 
 
 def toml_table(text: str) -> Table:
-    """The table of a TOML text; raises InputError where the text is not valid, and as `check_table`."""
+    """The table of a TOML text; raises InputError where the text is not valid, or nested more deeply than any scene."""
     try:
         table = tomllib.loads(text)
     except RecursionError:
         raise InputError(_TOO_DEEP) from None
     except ValueError as error:  # TOMLDecodeError, and decimal numbers of thousands of digits
         raise InputError(f"no valid TOML: {str(error).partition(';')[0]}") from None
-    check_table(table)
-    return table
-
-
-def check_table(table: Mapping[str, Any]) -> None:
-    """Raise InputError where a table is nested more deeply than any scene, or a whole number has more than 64 bits.
-
-    Those of TOML have no more, and Python neither makes floats of them nor writes them into a message in all cases.
-    """
     level: list[Any] = [table]
     for _ in range(MAX_DEPTH):  # a dotted key nests without a recursion of the parser
-        items = [item for entry in level for item in (entry.values() if isinstance(entry, Mapping) else entry)]
-        if any(isinstance(item, int) and not -(2**63) <= item < 2**63 for item in items):
-            raise InputError("a whole number has more than 64 bits; give a shorter one")
-        level = [item for item in items if isinstance(item, Mapping | list)]
+        values = (entry.values() if isinstance(entry, dict) else entry for entry in level)
+        level = [item for entry in values for item in entry if isinstance(item, dict | list)]
     if level:
         raise InputError(_TOO_DEEP)
+    return table
 
 
 def scene_from_table(

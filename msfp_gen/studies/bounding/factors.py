@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, Text
 from msfp_gen.common.inputs import is_input
-from msfp_gen.scene.file.catalogue import known_keys, parsed, suggestion
+from msfp_gen.scene.file.catalogue import check_whole_numbers, known_keys, parsed, suggestion
 from msfp_gen.scene.file.loader import toml_file, toml_table
 
 Pair = tuple[float, float]
@@ -149,6 +149,7 @@ def _bundled() -> dict[str, str]:
 
 def _read(name: str, table: Mapping[str, Any]) -> FactorTable:
     """Check the table of a TOML file."""
+    check_whole_numbers(table)
     known_keys(table, _TABLE_KEYS, "")
     rule = _choice(table.get("rule"), RULES, "rule")
     default = RULES[rule].adjustment

@@ -126,7 +126,7 @@ FRICTION = '[[factor]]\nproperty = "friction"\n'
     ("text", "words"),
     [
         ("rule = \n", ["no valid TOML"]),
-        (f"rule = 0x{'f' * 4000}\n", ["mine.toml: a whole number has more than 64 bits"]),
+        (f"rule = 0x{'f' * 4000}\n", ["mine.toml: rule: a whole number has more than 64 bits"]),
         (FRICTION + "direct = { test = [0.9, 1.1] }\n", ["rule is missing", "asce7", "aashto"]),
         ('rule = "asce"\n' + FRICTION, ["rule = 'asce'", "asce7"]),
         ('rule = "aashto"\n' + FRICTION + "direct = { test = [0.9, 1.1] }\n", ["adjustment is missing", "0.66"]),

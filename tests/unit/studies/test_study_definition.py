@@ -239,7 +239,10 @@ def test_the_example_is_a_study_of_a_few_hundred_runs(tmp_path: Any) -> None:
 
 
 WRONG = {
-    "digits": ({"axes": {"mu": {"sets": "bearing.friction", "values": [16**4000]}}}, "more than 64 bits"),
+    "digits": (
+        {"axes": {"mu": {"sets": "bearing.friction", "values": [16**4000]}}},
+        r"axes\.mu\.values\[0\]: a whole number has more than 64 bits",
+    ),
     "scene is missing": ({"scene": None}, "scene is missing"),
     "no such scene": ({"scene": "fenz-tset1"}, "did you mean|no such file"),
     "unknown key": ({"axis": {}}, "axis: unknown key; did you mean 'axes'"),
