@@ -313,7 +313,7 @@ def test_the_temperatures_of_the_monitor_are_those_of_the_law() -> None:
     run.run_segment()
     at = RestartState.of(run.segments[0].model, run.segments[0].run, 0.0)
     assert full.history.temperature is not None
-    np.testing.assert_allclose(at.temperature_parts.sum(axis=1), full.history.temperature[-1] - 20.0, rtol=0.03)
+    np.testing.assert_allclose(at.monitor_heat.sum(axis=1), full.history.temperature[-1] - 20.0, rtol=0.03)
 
 
 @pytest.mark.slow
