@@ -24,8 +24,7 @@ MSFP_INLINE void put_separation(double *block, const msfp_columns *q, const msfp
     const msfp_columns *const orders[3] = { q, v, a };
     for (int order = 0; order < 3; ++order)
         for (int i = 0; i < MSFP_SPACE; ++i)
-            memcpy(block + msfp_separation_field(order, i) * C, orders[order][3 + (MSFP_PLANAR ? 2 * i : i)],
-                   sizeof *q);
+            memcpy(block + msfp_separation_field(order, i) * C, orders[order][3 + (MSFP_PLANAR ? 2 * i : i)], sizeof *q);
 }
 #else
 #define put_separation(block, q, v, a) ((void)0)
@@ -121,8 +120,8 @@ MSFP_WIDE void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_
 }
 
 #if MSFP_RIMS
-MSFP_WIDE void msfp_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w, int j,
-                                const msfp_work_columns *d, double *columns)
+MSFP_WIDE void msfp_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                                int j, const msfp_work_columns *d, double *columns)
 {
     double x[MSFP_RIM_LOCAL], dx[MSFP_RIM_LOCAL * C];
     msfp_rim_coordinates(w->body[j], w->x[j + 1], x);
@@ -131,9 +130,10 @@ MSFP_WIDE void msfp_rim_columns(const msfp_parameters *p, const msfp_parameter_c
 }
 #endif
 
-MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                                      const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
-                                      const msfp_slopes *slopes, int wanted, msfp_work_columns *d)
+MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
+                                      const msfp_point *at, const msfp_point_columns *dat, const msfp_seed *seed,
+                                      const msfp_work *w, const msfp_slopes *slopes, int wanted,
+                                      msfp_work_columns *d)
 {
     msfp_blocks s;
     msfp_block_directions ds;

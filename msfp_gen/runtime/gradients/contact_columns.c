@@ -18,10 +18,9 @@ enum {
     FRICTION = MSFP_SHEAR_SIZE,
     UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns of a contact: g, and mu where it follows a law */
     RESULTS = MSFP_CONTACT_RESULTS,
-    INPUTS = MSFP_CONTACT_INPUTS, /* the unknowns come last */
+    INPUTS = MSFP_CONTACT_INPUTS,  /* the unknowns come last */
     GIVEN = INPUTS - UNKNOWNS,
-    FEW = MSFP_MEMORY ? RESULTS
-                      : MOMENT + UNKNOWNS /* results on which the motion depends; the source is among the last */
+    FEW = MSFP_MEMORY ? RESULTS : MOMENT + UNKNOWNS /* results on which the motion depends; the source is among the last */
 };
 enum { PARAMETERS, STAGE, LOCAL }; /* blocks of inputs */
 static const struct {
@@ -38,15 +37,15 @@ MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, dou
     double a[UNKNOWNS][INPUTS][LANES]; /* of the unknowns by the given inputs, then their matrix */
     for (int r = 0; r < UNKNOWNS; ++r)
         MSFP_UNROLL
-    for (int i = 0; i < INPUTS; ++i) {
-        const int stage = r < FRICTION && input[i].block == STAGE, given = i < GIVEN;
-        const double past = stage && input[i].index == MSFP_STAGE_Y + r, own = given ? past : -(i - GIVEN == r);
-        for (int s = 0; s < LANES; ++s) {
-            const double slope = (r < FRICTION ? tau[s] : 1.0) * jacobian[MOMENT + r][i][s] + own +
-                                 (stage && input[i].index == MSFP_STAGE_TAU ? rates[r * LANES + s] : 0.0);
-            a[r][i][s] = given ? slope : -slope;
+        for (int i = 0; i < INPUTS; ++i) {
+            const int stage = r < FRICTION && input[i].block == STAGE, given = i < GIVEN;
+            const double past = stage && input[i].index == MSFP_STAGE_Y + r, own = given ? past : -(i - GIVEN == r);
+            for (int s = 0; s < LANES; ++s) {
+                const double slope = (r < FRICTION ? tau[s] : 1.0) * jacobian[MOMENT + r][i][s] + own +
+                                     (stage && input[i].index == MSFP_STAGE_TAU ? rates[r * LANES + s] : 0.0);
+                a[r][i][s] = given ? slope : -slope;
+            }
         }
-    }
     for (int u = 0; u < UNKNOWNS; ++u) {
         double inverse[LANES], factor[LANES];
         for (int s = 0; s < LANES; ++s)
@@ -190,9 +189,9 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
     results_columns(slopes, inputs, GIVEN, rows, j, d->contact[j]);
 }
 
-MSFP_WIDE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
-                                    const msfp_point_columns *dat, const msfp_slopes *slopes, const msfp_seed *seed,
-                                    int all, msfp_work_columns *d)
+MSFP_WIDE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
+                                    const msfp_work *w, const msfp_point_columns *dat, const msfp_slopes *slopes,
+                                    const msfp_seed *seed, int all, msfp_work_columns *d)
 {
     for (int j = 0; j < NB; ++j) {
         if (all)

@@ -1,5 +1,5 @@
-/* observation.c: directional derivatives of what a run records, and of the powers whose integrals are its works. Where
- * a damper or a contact switches they are those of the branch taken. */
+/* observation.c: directional derivatives of what a run records, and of the powers whose integrals are its works. Where a
+ * damper or a contact switches they are those of the branch taken. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("O3") /* vectorises loops over columns */
 #endif
@@ -26,7 +26,8 @@ MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double
 
 MSFP_WIDE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
                                  const double q[MSFP_NB][MSFP_NQ], msfp_columns dq[MSFP_NB][MSFP_NQ],
-                                 double sliding[MSFP_NB][MSFP_GAP_SIZE], msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE])
+                                 double sliding[MSFP_NB][MSFP_GAP_SIZE],
+                                 msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE])
 {
     double body[MSFP_BODY_SIZE] = { 0 }, d[MSFP_BODY_SIZE * C] = { 0 };
     for (int j = 0; j < NB; ++j) {
@@ -134,9 +135,9 @@ static void set_observed(const msfp_point *at, const msfp_point_columns *dat, ms
 #endif
 }
 
-MSFP_WIDE void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                                      const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
-                                      msfp_state_columns *to)
+MSFP_WIDE void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_columns *dp,
+                                      const msfp_point *at, const msfp_point_columns *dat, const msfp_work *w,
+                                      const msfp_work_columns *d, msfp_state_columns *to)
 {
     msfp_blocks s;
     msfp_block_directions ds;
@@ -188,9 +189,9 @@ MSFP_INLINE void surface_columns(const msfp_parameters *p, const msfp_parameter_
     msfp_get_polar(d->force[j], row + MSFP_ROW_FORCE + 3 * j);
 }
 
-MSFP_WIDE void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                                   const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
-                                   msfp_columns *row)
+MSFP_WIDE void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
+                                   const msfp_point *at, const msfp_point_columns *dat, const msfp_work *w,
+                                   const msfp_work_columns *d, msfp_columns *row)
 {
     msfp_blocks s;
     msfp_block_directions ds;

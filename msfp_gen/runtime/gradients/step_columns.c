@@ -96,8 +96,7 @@ MSFP_INLINE void add_rates(const double *row, const msfp_columns *x, double *col
         columns[c] -= sum[c];
 }
 
-/* Columns of a solved stage and of its rates, by the derivatives with respect to its unknowns that its tangent
- * contains. */
+/* Columns of a solved stage and of its rates, by the derivatives with respect to its unknowns that its tangent contains. */
 MSFP_INLINE void stage_state(msfp_run *run, msfp_parameter_batch *batch, int i, const msfp_state_columns *from,
                              msfp_state_columns *to)
 {
@@ -196,7 +195,8 @@ static MSFP_WIDE void quasistatic_step(msfp_run *run, msfp_parameter_batch *batc
     msfp_friction_columns(&batch->work, next->df, next->f);
     for (int k = 0; k < NB; ++k)
         for (int c = 0; c < C; ++c)
-            next->a[k][ANGLE][c] = 2.0 * (next->v[k][ANGLE][c] - (next->q[k][ANGLE][c] - now->q[k][ANGLE][c]) / h) / h;
+            next->a[k][ANGLE][c] =
+                2.0 * (next->v[k][ANGLE][c] - (next->q[k][ANGLE][c] - now->q[k][ANGLE][c]) / h) / h;
     if (run->gradients->energies)
         msfp_quasistatic_works(run, batch);
 }

@@ -70,11 +70,11 @@ static void friction_work(const msfp_run *run, const msfp_parameter_batch *batch
                           msfp_columns work[WORKS])
 {
     for (int k = 0; k < NB; ++k) {
-        const double slip[MSFP_SLIP_SIZE] = {
-            [MSFP_SLIP_Y] = run->now.f[k][0], [MSFP_SLIP_TURN] = run->next.q[k][ANGLE] - run->now.q[k][ANGLE]
+        const double slip[MSFP_SLIP_SIZE] = { [MSFP_SLIP_Y] = run->now.f[k][0],
+                                              [MSFP_SLIP_TURN] = run->next.q[k][ANGLE] - run->now.q[k][ANGLE] };
+        const double end[MSFP_SLIP_END_SIZE] = {
+            run->next.f[k][0], 0.5 * (run->step_history.normal[k] + run->next_step_history.normal[k])
         };
-        const double end[MSFP_SLIP_END_SIZE] = { run->next.f[k][0], 0.5 * (run->step_history.normal[k] +
-                                                                           run->next_step_history.normal[k]) };
         double dslip[MSFP_SLIP_SIZE * C] = { 0 }, dend[MSFP_SLIP_END_SIZE * C], done[MSFP_SLIP_WORK_SIZE * C];
         for (int c = 0; c < C; ++c) {
             dslip[MSFP_SLIP_Y * C + c] = batch->now.f[k][0][c];
@@ -85,8 +85,7 @@ static void friction_work(const msfp_run *run, const msfp_parameter_batch *batch
         msfp_slip_work_direction(run->parameters.surface[k], slip, end, batch->parameters.surface[k], dslip, dend,
                                  done);
         msfp_add_columns(&work[MSFP_WORK_FRICTION_STORED], (const msfp_columns *)done + MSFP_SLIP_WORK_STORED, 1.0, 1);
-        msfp_add_columns(&work[MSFP_WORK_FRICTION_DISSIPATED], (const msfp_columns *)done + MSFP_SLIP_WORK_LOST, 1.0,
-                         1);
+        msfp_add_columns(&work[MSFP_WORK_FRICTION_DISSIPATED], (const msfp_columns *)done + MSFP_SLIP_WORK_LOST, 1.0, 1);
     }
 }
 
