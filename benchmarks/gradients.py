@@ -19,7 +19,7 @@ from instructions import AVX2, instructions
 from quick import parser, pick
 
 from msfp_gen import Scene, load_scene
-from msfp_gen.generator.lower import COLUMNS
+from msfp_gen.generator.lower import GRADIENT_COLUMNS
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.parameters import parameters_of
 from msfp_gen.simulation.gradients import start_gradients
@@ -99,7 +99,7 @@ def main() -> None:
                 done = f"{counts['steps']} | {rates[0]:.1f} | {rates[1]:.1f}"
             one = (shares[-1] - shares[-2]) / (COUNTS[-1] - COUNTS[-2])  # parameter of a full group
             each = [share / count for share, count in zip(shares, COUNTS, strict=True)]
-            parts = [shares[-2] - COUNTS[-2] * one, COLUMNS * one, *each]
+            parts = [shares[-2] - COUNTS[-2] * one, GRADIENT_COLUMNS * one, *each]
             print(f"| {title}, rtol {rtol:g} | {done} | {' | '.join(f'{100 * p:.0f} %' for p in parts)} |", flush=True)
 
 

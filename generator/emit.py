@@ -17,7 +17,7 @@ from .derive import Equations
 from .drivers import schedule_context, scheduled_kernels
 from .functions import to_c
 from .interface import checks_context, environment, interface_context, model_name, public_header, word_enums
-from .lower import COLUMNS, Kernel, contact_lists, jacobian_column, ordered_active_inputs
+from .lower import GRADIENT_COLUMNS, Kernel, contact_lists, jacobian_column, ordered_active_inputs
 from .program import Block, Use
 
 # Each is made from the template of its name.
@@ -251,7 +251,7 @@ def emit(
         "functions": [function(k) for k in kernels],
         "directional": [function(k) for k in directional],
         "by_ends": [function(k) for k in by_ends],
-        "gradient": {"columns": COLUMNS} | contact_lists(k.program for k in directional),
+        "gradient": {"columns": GRADIENT_COLUMNS} | contact_lists(k.program for k in directional),
         "nb": spec.layout.surfaces,
         "lanes": lanes(spec.layout.surfaces),
         "description": json.dumps(description(spec)),

@@ -173,9 +173,9 @@ def needed_tangents(
     return tuple(p for p in partials if p.target in used), tuple(reversed(backwards))
 
 
-COLUMNS = 4
+GRADIENT_COLUMNS = 4
 """Parameters whose derivatives one call carries: as many numbers as the vectors of most processors hold."""
-CONTACT = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "drill", "mu", "source", "memory")
+CONTACT_RESULTS = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "drill", "mu", "source", "memory")
 """Results of `contact`, beside its moment, whose derivatives are used."""
 CONTACT_INPUTS = ("par", "h", "loc", "g", "c")
 """Inputs of `contact`: parameters, stage formula, force and slip rotation; and what its local equations determine,
@@ -245,7 +245,7 @@ def by_inputs(program: Program) -> Program:
         return replace(use, active=frozenset(names - {"sign"}), moving=True)
 
     assert tuple(use.alias for use in program.inputs) in (CONTACT_INPUTS[:4], (*CONTACT_INPUTS[:4], "c"))
-    results = frozenset(name for name in program.results if name in CONTACT or name.startswith("M"))
+    results = frozenset(name for name in program.results if name in CONTACT_RESULTS or name.startswith("M"))
     return replace(program, name="contact_by_inputs", inputs=[used(use) for use in program.inputs], tangents=results)
 
 

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from msfp_gen.jit.build import LEVELS, add_prebuilt, build_driver, prebuilt_specs, prepare
+from msfp_gen.jit.build import PREBUILT_LEVELS, add_prebuilt, build_driver, prebuilt_specs, prepare
 from msfp_gen.jit.cache import digest_sources
 from msfp_gen.jit.compiler import zig_program
 
@@ -83,7 +83,7 @@ def check_sources(unpacked: Path) -> None:
 def add_models(root: Path, zig: Path, cache: Path) -> None:
     """Build every model for every level of the processor, and the drivers for all, and copy them to `root`."""
     os.environ.pop("MSFP_GEN_CFLAGS", None)
-    for level in LEVELS[: pick(None, 1)]:
+    for level in PREBUILT_LEVELS[: pick(None, 1)]:
         os.environ["CC"] = shlex.join([str(zig), *OPTIONS, f"-mcpu={PROCESSORS[level]}"])
         os.environ["MSFP_GEN_CACHE"] = str(cache / str(level))
         for spec in prebuilt_specs()[: pick(None, 1)]:

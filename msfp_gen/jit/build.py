@@ -45,10 +45,10 @@ Progress = Callable[[str, float], None]
 ENTRY = "msfp_entry.c"
 _INCLUDE = re.compile(r'(?:#include|cdef extern from) "([\w.]+)"')
 GENERATION_SHARE = 0.13  # of the build time, for the progress display; compilation takes the rest
-SUFFIX = ".abi3.so"  # of the models of a wheel
-LEVELS = (3, 1)
+PREBUILT_SUFFIX = ".abi3.so"  # of the models that a wheel brings
+PREBUILT_LEVELS = (3, 1)
 """Levels of x86-64 that a wheel has models for: every processor, and those with AVX2."""
-LAYOUTS = (Layout(2, 1, 0), Layout.dfp(), Layout.tfp())
+PREBUILT_LAYOUTS = (Layout(2, 1, 0), Layout.dfp(), Layout.tfp())
 
 
 @dataclass(frozen=True)
@@ -376,7 +376,7 @@ def prebuilt_specs() -> list[ModelSpec]:
     """
     alone = [
         ModelSpec(layout, Effects(dimension=dimension, sliders=sliders, rims=rims))
-        for layout in LAYOUTS
+        for layout in PREBUILT_LAYOUTS
         for dimension in ("spatial", "planar")
         for sliders in ("inertial", "massless")
         for rims in (True, False)
@@ -384,7 +384,7 @@ def prebuilt_specs() -> list[ModelSpec]:
     below = [Effects(top_rotation=True, uplift=uplift) for uplift in (False, True)]
     shaken = [*(Effects(rims=rims) for rims in (True, False)), *below]
     heated = [ModelSpec(Layout.tfp(), replace(effects, friction="pvt", bouc_wen="plastic")) for effects in shaken]
-    return [*alone, *(ModelSpec(layout, effects) for layout in LAYOUTS for effects in below), *heated]
+    return [*alone, *(ModelSpec(layout, effects) for layout in PREBUILT_LAYOUTS for effects in below), *heated]
 
 
 def prebuilt_folder() -> Path:
@@ -414,7 +414,7 @@ def add_prebuilt(level: int, built: Path, root: Path) -> Path:
     data = (built / manifest.extension).read_bytes()
     folder = root / _folder_name(manifest.module, _content(manifest), level)
     folder.mkdir(parents=True)
-    extension = f"{manifest.module}{SUFFIX}"
+    extension = f"{manifest.module}{PREBUILT_SUFFIX}"
     (folder / extension).write_bytes(data)
     files = {extension: hashlib.sha256(data).hexdigest()}
     compiler = [Path(word).name if Path(word).is_absolute() else word for word in manifest.inputs["compiler"]]
@@ -438,7 +438,7 @@ def _find(module: str, content: str) -> tuple[Path, cache.Manifest] | None:
     if not root.is_dir() or words(COMPILER) or words(CFLAGS):
         return None
     reached = x86_64_level() or 1
-    for level in (level for level in LEVELS if level <= reached):
+    for level in (level for level in PREBUILT_LEVELS if level <= reached):
         folder = root / _folder_name(module, content, level)
         if not folder.is_dir():
             continue

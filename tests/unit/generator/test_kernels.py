@@ -16,7 +16,7 @@ from support import Array
 from msfp_gen import Effects, Layout
 from msfp_gen.generator import generate
 from msfp_gen.generator.derive import Equations, derive
-from msfp_gen.generator.lower import COLUMNS, DIFFERENTIATED
+from msfp_gen.generator.lower import DIFFERENTIATED, GRADIENT_COLUMNS
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.specification.layout import ModelSpec
@@ -67,13 +67,13 @@ class Kernels:
         program = self.programs[name]
         assert program.output is not None
         blocks, fields = self._blocks(name, given), [f.name for f in program.output.block.fields]
-        moves = [np.zeros((len(block), COLUMNS)) for block in blocks]
+        moves = [np.zeros((len(block), GRADIENT_COLUMNS)) for block in blocks]
         for use, move in zip(program.inputs, moves, strict=True):
             if use.alias == alias:
-                move[[f.name for f in use.block.fields].index(field)] = np.arange(1, COLUMNS + 1)
-        out = np.zeros((len(fields), COLUMNS))
+                move[[f.name for f in use.block.fields].index(field)] = np.arange(1, GRADIENT_COLUMNS + 1)
+        out = np.zeros((len(fields), GRADIENT_COLUMNS))
         self._call(f"{name}_direction", [*blocks, *moves, out])
-        assert np.allclose(out, np.outer(out[:, 0], np.arange(1, COLUMNS + 1)), rtol=1e-12, atol=1e-12)
+        assert np.allclose(out, np.outer(out[:, 0], np.arange(1, GRADIENT_COLUMNS + 1)), rtol=1e-12, atol=1e-12)
         return dict(zip(fields, out[:, 0], strict=True))
 
     def _blocks(self, name: str, given: dict[str, dict[str, float]]) -> list[Array]:

@@ -121,4 +121,4 @@ def test_names_kept_by_hand_are_those_of_blocks():
     for name, quantities in two_port.FIXED.items():
         assert set(quantities) <= set(getattr(blocks, name).quantities), name
     assert set(two_port.CONTACT) <= set(blocks.contact.quantities)
-    assert set(lower.CONTACT) <= {field.name for field in blocks.contact.fields}
+    assert set(lower.CONTACT_RESULTS) <= {field.name for field in blocks.contact.fields}

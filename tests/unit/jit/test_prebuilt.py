@@ -25,7 +25,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setenv("MSFP_GEN_CACHE", str(folder / "models"))
         patch.setitem(__import__("sys").modules, "msfp_gen.generator", fake_model.generator())
         built = build.prepare(SPEC, portable=True)
-        for level in build.LEVELS:
+        for level in build.PREBUILT_LEVELS:
             build.add_prebuilt(level, built.folder, build.prebuilt_folder())
     return folder / "house"
 
