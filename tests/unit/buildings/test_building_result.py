@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from support import preset_run
@@ -101,6 +102,14 @@ def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
     assert opened(file).identical(one.dataset.assign_attrs(digest=opened(file).attrs["digest"]))
     with pytest.raises(InputError, match="one bearing of a building; read the file of the building"):
         BuildingResult.from_netcdf(file)
+
+
+def test_a_file_without_extremes_is_refused(tmp_path: Path):
+    path = pushed().to_netcdf(tmp_path / "frame.nc")
+    with h5py.File(path, "r+") as file:
+        del file["extremes"], file.attrs["digest"]
+    with pytest.raises(InputError, match=r"frame\.nc.*the group extremes is missing"):
+        BuildingResult.from_netcdf(path)
 
 
 def test_columns_of_a_scene_are_those_of_its_pushed():
