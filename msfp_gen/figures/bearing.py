@@ -400,13 +400,12 @@ def plot_result(result: BearingData, path: str | Path | None = None) -> Figure:
 
 
 def _title(result: BearingData) -> str:
-    """Name and peaks; of a failed run also the time it reached."""
-    history, load = result.history, result.axial_load
-    force = np.hypot(*history.top_force[:, :2].T).max()
+    """Name and peaks over all steps; of a failed run also the time it reached."""
+    load = result.axial_load
+    displacement, force = result.extremes.displacement[3], result.extremes.top_force[3]
     scale = engineering(force, "N")
     lines = [
         label_of(result),
-        f"peak displacement {history.horizontal.max() * MILLI:.4g} mm, peak force {force * scale.factor:.4g} "
-        f"{scale.unit}",
+        f"peak displacement {displacement * MILLI:.4g} mm, peak force {force * scale.factor:.4g} {scale.unit}",
     ]
     return ", ".join(lines) + (f", F/N = {force / load:.3f}" if load else "")

@@ -114,17 +114,17 @@ def plot_building(result: BuildingResult, path: str | Path | None = None) -> Fig
 def draw_plan(axes: Axes, result: BuildingResult) -> None:
     """Bearings at their places with their orbits, magnified, and the centre of mass at rest."""
     scene, bearings = result.scene, result.bearings
-    peak = max(float(one.history.horizontal.max()) for one in bearings)
+    peaks = [float(one.extremes.displacement[3]) for one in bearings]
+    peak = max(peaks)
     factor = magnification(scene.places, peak)
-    for one, place in zip(bearings, scene.places, strict=True):
+    for one, own, place in zip(bearings, peaks, scene.places, strict=True):
         u = shown_sign().factor * factor * one.history.displacement[:, :2]
         axes.plot(*(place + u).T, color=COLOURS[0], linewidth=HAIR)
         axes.plot(*place, marker="s", markersize=3.5, color=INK, linestyle="none")
         if len(bearings) <= LABELLED:
-            own = 1e3 * float(one.history.horizontal.max())
             name = scene.bearings[one.index].name or str(one.index + 1)
             axes.annotate(
-                f"{plain(name)}: {own:.0f} mm",
+                f"{plain(name)}: {MILLI * own:.0f} mm",
                 place + np.array([0.0, -factor * peak]),
                 textcoords="offset points",
                 xytext=(0, -3),
@@ -160,7 +160,7 @@ def draw_profile(row: list[Axes], result: BuildingResult) -> None:
         if axis < 2 and storeys:
             drifts = [100 * storey["peak_drift"][key] / storey["height"] for storey in storeys]
             shears = [storey["peak_shear"][key] / result.scene.weight for storey in storeys]
-            base = float(np.abs(result.base_reaction[:, axis]).max()) / result.scene.weight
+            base = result.summary["peak_force"][key] / result.scene.weight
             for axes, values in ((row[1], drifts), (row[2], shears)):
                 axes.stairs(values, heights[: len(values) + 1], orientation="horizontal", color=colour, linewidth=LINE)
             row[2].plot(base, heights[0], marker="x", color=colour, linestyle="none")
@@ -194,9 +194,9 @@ def draw_axial_history(axes: Axes, result: BuildingResult) -> None:
 
 def draw_axial_ranges(axes: Axes, result: BuildingResult) -> None:
     """Least, greatest and resting axial force of every bearing [kN]."""
-    scene, force = result.scene, 1e-3 * result.axial_force
+    scene = result.scene
     number = np.arange(len(scene.bearings))
-    low, high = force.min(axis=0), force.max(axis=0)
+    low, high = 1e-3 * result.extremes.axial_force.T
     axes.barh(number, high - low, left=low, height=0.55, color=COLOURS[5], label="range")
     axes.plot(1e-3 * scene.axial_loads, number, marker="|", markersize=9, color=INK, linestyle="none", label="at rest")
     names = [plain(mount.name or str(index + 1)) for index, mount in enumerate(scene.bearings)]
@@ -216,8 +216,7 @@ def title_of(result: BuildingResult) -> str:
 
 
 def _overview_title(result: BuildingResult) -> str:
-    peak = max(float(one.history.horizontal.max()) for one in result.bearings)
-    shear = float(np.hypot(*result.base_reaction[:, :2].T).max()) / result.scene.weight
+    peak, shear = result.summary["peak_displacement"]["radial"], result.summary["peak_force_ratio"]
     return f"{title_of(result)}, bearings move {MILLI * peak:.4g} mm, base shear {shear:.3f} of the weight"
 
 
