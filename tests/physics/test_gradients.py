@@ -52,12 +52,12 @@ ROUNDING = {"top_dissipated": 4e-10}
 class FrozenSteps:
     """Runs of a scene with the steps that it takes at its tolerance, and with Newton's method converged further.
 
-    steps: ends of other steps [s].
+    steps: ends of other steps [s]. output_step: of rows at even times, which are interpolated [s]; None: at the steps.
     """
 
-    def __init__(self, scene: Scene, steps: Array | None = None) -> None:
+    def __init__(self, scene: Scene, steps: Array | None = None, output_step: float | None = None) -> None:
         self.steps = simulate(scene).history.time[1:] if steps is None else steps
-        self.scene = replace(scene, solver=replace(scene.solver, rtol=1e-10), output_step=None)
+        self.scene = replace(scene, solver=replace(scene.solver, rtol=1e-10), output_step=output_step)
         self.model: Model = build_model(scene.bearing.layout, scene.modelled, gradients=True)
 
     def run(self, scene: Scene, parameters: Sequence[Parameter]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
@@ -87,14 +87,15 @@ def check_frozen(
     weak: float = 100.0,
     steps: Array | None = None,
     rounding: float = 1e-11,
+    output_step: float | None = None,
 ) -> dict[str, Any]:
     """Every derivative agrees to 1e-6 of its largest value, but for the rounding of the differences; returns the rows.
 
     Newton's method stops at 1e-10 of the friction, and mostly far below; a difference divides that by its step.
-    size: of that step, over the parameter; `weak` times that of parameters on which the run depends weakly. steps: of
-    `FrozenSteps`. rounding: of the runs, over the quantity.
+    size: of that step, over the parameter; `weak` times that of parameters on which the run depends weakly. steps,
+    output_step: of `FrozenSteps`. rounding: of the runs, over the quantity.
     """
-    frozen = FrozenSteps(scene, steps)
+    frozen = FrozenSteps(scene, steps, output_step)
     parameters = parameters_of(scene, paths)
     values, slopes = frozen.run(frozen.scene, parameters)
     for parameter, slope in zip(parameters, slopes, strict=True):
@@ -121,6 +122,15 @@ def test_differences_with_the_same_steps_of_fourth_order() -> None:
     check_frozen(scene, [*STACK, *RIG], weak=1.0)
     check_frozen(scene, [*STATE[:3], "motion.direction"], 1e-5)
     check_frozen(scene, STATE[3:], 1e-7)
+
+
+def test_differences_with_the_same_steps_of_interpolated_rows() -> None:
+    """Large steps, whose friction state exceeds 1: it bounds that of the rows between them, which exceed it."""
+    scene = triple(3.0, rtol=1e-2)
+    values = check_frozen(scene, ["bearing.surfaces[*].friction", *RIG[:2], "motion.scale"], output_step=0.05)
+    size = np.linalg.norm(values["friction_state"][:, 0], axis=1)
+    most = size.max()
+    assert most > 1.0 + 1e-4 and (size > most - 1e-12).sum() > 1
 
 
 def test_the_load_before_a_jump_counts_in_the_step_that_ends_there() -> None:

@@ -20,6 +20,7 @@ from support.synthetic import LOAD, history, loops, ramp, scene
 
 from msfp_gen import Bearing, Body, Effects, InputError, Layout, Motion, Scene, Solver, Surface, Top, simulate
 from msfp_gen.cli import main
+from msfp_gen.common.tables import Table
 from msfp_gen.results.characterise import Characterisation, characterise
 from msfp_gen.results.loops import closed_cycles, loop_area, turning_points
 from msfp_gen.results.result import Result
@@ -301,6 +302,36 @@ def test_an_orbit_is_characterised_by_its_envelope() -> None:
 
 def rows_of(text: str) -> list[dict[str, str]]:
     return list(csv.DictReader(text.splitlines()))
+
+
+UNITS = {"mm": 1e-3, "kN": 1e3, "kN/m": 1e3, "s": 1.0, "J": 1.0, "%": 1e-2, "mm/s": 1e-3, "kW/m2": 1e3, "kJ/m2": 1e3}
+"""Unit in the heading of a column -> its size in SI."""
+
+
+def printed(table: Table) -> Array:
+    """The numbers below headings with a unit, in SI; nan where there is none."""
+    units = {place: UNITS[name[name.index("[") + 1 : -1]] for place, name in enumerate(table.columns) if "[" in name}
+    cells = [["nan" if row[place] == "-" else row[place] for place in units] for row in table.rows]
+    return np.array(cells, dtype=float) * [*units.values()]
+
+
+def test_printed_numbers_are_in_the_unit_of_their_heading() -> None:
+    found = characterise(preset_run("fenz-test2"))
+    cycles, stages = found.tables()[1:3]
+    assert found.first_loading is not None
+    branches = (found.first_loading, *found.cycles[-1].branches)
+    lines = [dataclasses.astuple(stage)[1:] for branch in branches for stage in branch.stages]
+    assert printed(stages) == pytest.approx(np.array(lines), rel=3e-2, abs=6e-6)
+    loops = [cycle.loop for cycle in found.cycles]
+    names = ("displacement_least", "displacement_most", "effective_stiffness", "energy_dissipated", "effective_damping",
+             "zero_displacement_force")  # fmt: skip
+    values = [[getattr(loop, name) for name in names] for loop in loops]
+    shown = printed(Table("", cycles.columns, cycles.rows[: len(loops)]))
+    periods = [cycle.effective_period for cycle in found.cycles]
+    assert shown == pytest.approx(np.insert(np.array(values), 3, periods, axis=1), rel=6e-3, abs=6e-6)
+    demand = ("capacity_left", "capacity_left_share", "peak_velocity", "peak_heat_flux", "heat", "maximum_uplift")
+    values = [[getattr(surface, name) for name in demand] for surface in found.surfaces]
+    assert printed(found.demand_table()) == pytest.approx(np.array(values, float), rel=6e-3, abs=6e-6, nan_ok=True)
 
 
 def test_command_prints_tables_and_writes_csv(tmp_path: Any, capsys: Any) -> None:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support import preset_run, scene_of
+from support.gradients import heated
 
 from msfp_gen import Motion, Result, simulate
 from msfp_gen.results.history import Extremes
+from msfp_gen.specification import contract
 
 PEAKS = ("peak_displacement", "peak_force", "peak_sliding", "minimum_gap", "minimum_normal_force")
 
@@ -55,6 +57,18 @@ def test_parted_surfaces_do_not_slide() -> None:
     speed = Extremes.of_rows(replace(history, lift=lift)).slip_speed
     whole = np.linalg.norm(history.slip_velocity, axis=2)
     assert speed.tolist() == pytest.approx([whole[:, 0].max(), 0.0, whole[:100, 2].max(), whole[:, 3].max()])
+
+
+def test_every_extreme_is_that_of_rows_close_together() -> None:
+    """A motion in two directions over surfaces that warm up, with rows so far apart that they miss all extremes."""
+    scene = replace(heated(0.03), motion=Motion.harmonic(0.05, 0.5, cycles=2.0, direction=0.6))
+    rows = Extremes.of_rows(simulate(replace(scene, output_step=1e-3)).history)
+    recorded = simulate(replace(scene, output_step=0.45)).recorded_extremes
+    assert recorded is not None
+    names = [extreme.name for extreme in contract.extremes(scene.modelled)]
+    assert {*names} == {field.name for field in fields(Extremes) if getattr(recorded, field.name) is not None}
+    for name in names:
+        assert getattr(recorded, name) == pytest.approx(getattr(rows, name), rel=1e-2), name
 
 
 def test_a_turning_point_inside_a_step_counts() -> None:

@@ -27,9 +27,11 @@ from msfp_gen import (
 from msfp_gen.buildings.explain import explain
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.results.result import Result
+from msfp_gen.scene import effect_switching
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import Ending, all_effects, next_effects, stopping_monitors
 from msfp_gen.scene.file.loader import scene_from_table
+from msfp_gen.scene.friction_parameters import thermal_softening
 from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation import simulate as simulation
@@ -301,6 +303,18 @@ def test_heat_without_numbers_is_noted() -> None:
     result = simulate(scene)
     assert [note.kind for note in result.notes] == ["heat"] and "K" in result.notes[0].line
     assert result.summary["notes"] == [note.line for note in result.notes]
+
+
+@pytest.mark.parametrize(("share", "noted"), [(1.2, True), (0.95, False)])
+def test_heat_is_noted_from_its_limit_on(share: float, noted: bool, monkeypatch: Any) -> None:
+    """share: the largest rise in temperature, over its limit."""
+    scene = replace(TEST2, motion=Motion.harmonic(0.08, 0.5, cycles=2), duration=None)
+    softening = thermal_softening(scene.modelled.law, scene.bearing)
+    monkeypatch.setattr(effect_switching, "NOTED_SOFTENING", 1e-4)
+    (note,) = simulate(scene).notes
+    assert note.kind == "heat" and note.value * softening > 1e-4
+    monkeypatch.setattr(effect_switching, "NOTED_SOFTENING", note.value * softening / share)
+    assert [other.value for other in simulate(scene).notes] == [note.value] * noted
 
 
 @pytest.mark.slow
