@@ -54,6 +54,8 @@ PARTS = {
 CHOSEN: dict[str, tuple[str, ...]] = {
     "generator/latex.py": ("tests/unit/generator",),
     "generator/interface.py": ("tests/unit/generator", "tests/unit/embedding/test_library.py"),
+    "generator/emit.py": (EQUATIONS, "tests/unit/generator", "tests/unit/results/test_extremes.py"),
+    "generator/two_port.py": ("tests/unit/embedding/test_two_port.py", "tests/physics/test_two_port.py"),
     "generator/laws.py": (
         "tests/physics/test_friction_laws.py",
         "tests/physics/test_hysteresis.py",
@@ -73,6 +75,7 @@ CHOSEN: dict[str, tuple[str, ...]] = {
     "*/runtime/equations/*": (EQUATIONS, "tests/physics/test_reference.py"),
     "*/runtime/steppers/quasistatic.c": ("tests/physics/test_quasistatic.py",),
     "*/runtime/steppers/*": ("tests/hard/test_convergence.py", "tests/unit/runtime/test_esdirk.py"),
+    "msfp_gen/simulation/outcome.py": ("tests/unit/simulation/test_notes.py", "tests/physics/test_hysteresis.py"),
     "*/runtime/run/monitors.c": ("tests/unit/simulation/test_auto.py", "tests/physics/test_friction_laws.py"),
     "*/runtime/run/*": (RUNS, "tests/hard/test_limits.py", "tests/hard/test_rims.py", "tests/hard/test_ladder.py"),
     "*/runtime/gradients/*": ("tests/physics/test_gradients.py", "tests/unit/simulation/test_gradients.py"),

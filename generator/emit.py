@@ -220,11 +220,10 @@ def extreme_entries(spec: ModelSpec) -> Iterator[str]:
         vector = extreme.shape == (4,)
         field = None if extreme.of == contract.ACROSS else fields_of[extreme.of]
         pair = field is not None and field.shape[1:] == (2,)
-        count, stride = ("4", 1) if vector else ("MSFP_NB", 2 if pair else 1)
-        how = "VECTOR" if vector else "LENGTH" if pair else "NUMBER"
+        count, how = ("4", "VECTOR") if vector else ("MSFP_NB", "LENGTH" if pair else "NUMBER")
         of = "MSFP_ACROSS" if field is None else f"MSFP_ROW_{extreme.of.upper()}"
         flags = ", ".join(str(int(flag)) for flag in (extreme.least, extreme.positions, extreme.loaded))
-        yield f"{count}, {of}, {stride}, MSFP_{how}, {flags}"
+        yield f"{count}, {of}, MSFP_{how}, {flags}"
 
 
 def emit(

@@ -174,6 +174,20 @@ def test_extremes_of_a_friction_law_that_heats_are_those_of_the_steps() -> None:
         np.testing.assert_allclose(summary[key], expected, rtol=1e-9, err_msg=key)
 
 
+def test_the_largest_force_along_each_axis_is_differentiated_where_it_occurs() -> None:
+    scene = triple(3.0)
+    scene = replace(scene, motion=scene.motion.rotated(0.6), motion_table=None)
+    result = simulate(scene, gradients=["bearing.surfaces[0].friction"], gradient_errors=False)
+    force, slope = result.history.top_force, result.gradient["top_force"].values[0]
+    radial = np.hypot(force[:, 0], force[:, 1])
+    rows = [*np.abs(force).argmax(axis=0), radial.argmax()]
+    along = [np.sign(force[rows[axis], axis]) * slope[rows[axis], axis] for axis in range(3)]
+    expected = [*along, force[rows[3], :2] @ slope[rows[3], :2] / radial[rows[3]]]
+    assert np.abs(expected[:2]).min() > 0
+    summary = result.gradient_summary["bearing.surfaces[0].friction"]["peak_force"]
+    np.testing.assert_allclose([*summary.values()], expected, rtol=1e-9)
+
+
 @pytest.mark.slow
 def test_differences_with_the_same_steps_through_friction_that_falls_with_the_path() -> None:
     scene = double()

@@ -5,7 +5,7 @@
 
 /* A field of msfp_extremes: of surfaces, or of a vector along E1, E2, E3 and in the horizontal plane. */
 typedef struct {
-    int count, of, stride; /* how many numbers; where in a row the first is of, and the distance to the next */
+    int count, of; /* how many numbers; where in a row the first is of */
     enum { MSFP_NUMBER, MSFP_LENGTH, MSFP_VECTOR } how; /* the length is that of two numbers */
     int least;                                          /* whether the least counts, otherwise the largest */
     int positions;                                      /* whether it follows from positions alone */
@@ -27,7 +27,7 @@ MSFP_INLINE double value_of(const field *f, const double *u, int k)
 {
     if (f->how == MSFP_VECTOR)
         return k < 3 ? fabs(u[k]) : length(u);
-    return f->how == MSFP_LENGTH ? length(u + k * f->stride) : u[k * f->stride];
+    return f->how == MSFP_LENGTH ? length(u + 2 * k) : u[k];
 }
 
 int msfp_extreme_slopes(int index, const msfp_row *row, const double *across, int *of, double slopes[2])
@@ -35,8 +35,8 @@ int msfp_extreme_slopes(int index, const msfp_row *row, const double *across, in
     const field *f = fields;
     while (index >= f->count)
         index -= f++->count;
-    const int radial = f->how == MSFP_VECTOR && index == 3, first = radial ? 0 : index * f->stride;
-    const int count = radial || f->how == MSFP_LENGTH ? 2 : 1;
+    const int radial = f->how == MSFP_VECTOR && index == 3, count = radial || f->how == MSFP_LENGTH ? 2 : 1;
+    const int first = radial ? 0 : index * count;
     const double *u = numbers_of(f, row, across), value = value_of(f, u, index);
     for (int i = 0; i < count; ++i)
         slopes[i] = f->how == MSFP_NUMBER ? 1.0 : value > 0.0 ? u[first + i] / value : 0.0;
