@@ -62,7 +62,7 @@ CHOSEN: dict[str, tuple[str, ...]] = {
         EQUATIONS,
     ),
     "msfp_gen/specification/friction_laws.py": ("tests/physics/test_friction_laws.py",),
-    "generator/seat.py": ("tests/physics/test_uplift.py",),
+    "generator/unilateral.py": ("tests/physics/test_uplift.py",),
     "generator/top*.py": (EQUATIONS, "tests/physics/test_vertical_compliance.py"),
     "generator/lower.py": (EQUATIONS, "tests/physics/test_gradients.py", "tests/physics/test_tangents.py"),
     "generator/columns.py": (EQUATIONS, "tests/physics/test_gradients.py", "tests/physics/test_tangents.py"),

@@ -8,15 +8,18 @@ from pathlib import Path
 
 from msfp_gen.common.output import replacing
 from msfp_gen.common.tables import markdown_table
+from msfp_gen.generator import body, contact, energy, laws, parameters, top, two_port
 from msfp_gen.generator.derive import derive
 from msfp_gen.generator.latex import assembled_latex, statements
-from msfp_gen.generator.schedule import Decision, Over, Pass, condensed, momentum_balances, passes_of, two_port
+from msfp_gen.generator.schedule import Decision, Over, Pass, condensed, momentum_balances, passes_of
+from msfp_gen.generator.schedule import two_port as ends
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from quick import docs_folder, parser
 
 TARGET = docs_folder() / "equations.md"
+MODULES = (body, contact, energy, laws, parameters, top, two_port)
 ROWS = 6  # statements in one block; long blocks do not render everywhere
 
 INTRODUCTION = r"""# The equations, as the generator writes them
@@ -109,7 +112,7 @@ OVER = {
 PLACES = {"j": "γ", "j+1": "γ+1", "base": "1", "top": "n", "slider": "slider"}
 
 TITLES = {
-    "body_block": "Distances along the axis, from (3.4)-(3.11)",
+    "body_block": "Distances along the axis, from (3.2)-(3.11)",
     "forward": "Kinematics of a body from the body below: (2.1)-(2.6), (3.4)-(3.12), and rates with (2.36)",
     "gap": "Sliding and gap (3.20), (3.21)",
     "rim": "Rim contact (3.20)-(3.25), applied only while it pushes",
@@ -159,6 +162,12 @@ def assembled_section() -> list[str]:
     return parts
 
 
+def module_of(program: str) -> str:
+    """The module of the generator that has the function of a program, which has the name of the program."""
+    (found,) = (module for module in MODULES if hasattr(module, program))
+    return found.__name__.rpartition(".")[2]
+
+
 def program_sections() -> list[str]:
     """The statements of every program."""
     shown = (Effects(dimension="planar", sliders="massless", bouc_wen="report"), Effects(bouc_wen="report"))
@@ -166,7 +175,7 @@ def program_sections() -> list[str]:
     parts = []
     for name, title in TITLES.items():
         rows = [f"{left} &= {right}" for left, right in statements(programs[name])]
-        parts += [f"### {title}", f"Program `{name}`."]
+        parts += [f"### {title}", f"Program `{name}` of `generator/{module_of(name)}.py`."]
         parts += [block(rows[i : i + ROWS]) for i in range(0, len(rows), ROWS)]
     return parts
 
@@ -198,7 +207,7 @@ def schedule_section() -> list[str]:
         *(CONDENSED, schedule_table(passes_of(condensed(effects)))),
         *(UPLIFT, schedule_table((*uplift["forces"], *uplift["moments"]))),
         *(BALANCES, schedule_table(passes_of(momentum_balances(effects)))),
-        *(TWO_PORT, schedule_table(passes_of(two_port(Effects(top_rotation=True))))),
+        *(TWO_PORT, schedule_table(passes_of(ends(Effects(top_rotation=True))))),
     ]
 
 

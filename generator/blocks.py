@@ -1,19 +1,23 @@
 """The blocks that programs exchange: the numbers that C stores per body, per surface and at the top.
 
-The order of the fields here is the order in memory; the emitted header spells it out.
-In a planar model polar vectors keep (E1, E3), axial ones keep E2.
+The order of the fields here is the order in memory, which the emitted header `msfp_model.h` states. In a planar model
+polar vectors keep (E1, E3), axial ones keep E2.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from msfp_gen.specification import contract
 
-from .program import AXIAL, POLAR, Block, BlockBuilder, Maker
+from .program import AXIAL, POLAR, Block, BlockBuilder
+
+Maker = Callable[[str], BlockBuilder]
+"""Begins the block of a given name."""
 
 
-def top_blocks(new: Maker) -> dict[str, Block]:
+def _top(new: Maker) -> dict[str, Block]:
     """Parameters of the top, its wrench, the foot of a mass on a vertical spring, the rotating support."""
     return {
         "top_parameters": new("top_parameters")
@@ -79,7 +83,7 @@ class Blocks:
     top_parameters: Block
     coordinates: Block
     body: Block
-    vector: Block
+    force: Block
     moment: Block
     wrench: Block
     contact_frame: Block
@@ -132,7 +136,7 @@ class Blocks:
     """The friction coefficient as an unknown, where it follows a law."""
 
 
-def _parameters(new: Maker, uplift: bool) -> dict[str, Block]:
+def _parameters(new: Maker) -> dict[str, Block]:
     """Parameters of bodies and surfaces."""
     return {
         "body_parameters": new("body_parameters")
@@ -220,10 +224,24 @@ def _motion(new: Maker, uplift: bool) -> dict[str, Block]:
     }
 
 
-def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
+def _points(new: Maker) -> Block:
+    """The named points of a body (3.2)-(3.11) with velocity and acceleration."""
+    builder = new("points")
+    for name, meaning in (
+        ("lo", "r_k-1,k bottom centre"),
+        ("cm", "r_k centre of mass"),
+        ("up", "r_k,k top centre"),
+        ("sc", "r_kc sphere centre above"),
+    ):
+        for order, unit in (("r", "m"), ("v", "m/s"), ("a", "m/s^2")):
+            builder.vector(f"{order}_{name}", unit, f"{meaning}: {order}", POLAR)
+    return builder.build()
+
+
+def _interfaces(new: Maker) -> dict[str, Block]:
     """Interface force and moment of a surface, its friction and its contact."""
     return {
-        "vector": new("force").vector("F", "N", "force on the body above the interface", POLAR).build(),
+        "force": new("force").vector("F", "N", "force on the body above the interface", POLAR).build(),
         "moment": new("moment").vector("M", "N m", "moment on the body above, about the sphere centre", AXIAL).build(),
         "wrench": new("wrench")
         .vector("F", "N", "force on the body above the interface", POLAR)
@@ -307,7 +325,7 @@ def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
 
 
 def _rim_coordinates(new: Maker, uplift: bool) -> Block:
-    """What the gap of a rim depends on: the tilts of the body above, and with uplift the separation."""
+    """Coordinates of the gap of a rim: the tilts of the body above, and with uplift the separation."""
     builder = (
         new("rim_coordinates")
         .scalar("psi", "rad", "psi of the body above", 0)
@@ -351,7 +369,7 @@ def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
     }
 
 
-def _powers(new: Maker, uplift: bool) -> dict[str, Block]:
+def _powers(new: Maker) -> dict[str, Block]:
     """Energies of springs and powers of the energy balance."""
     return {
         "friction_power": new("friction_power")
@@ -394,7 +412,7 @@ def _works(new: Maker) -> Block:
     return builder.build()
 
 
-def _ends(new: Maker, uplift: bool) -> dict[str, Block]:
+def _ends(new: Maker) -> dict[str, Block]:
     """Ends of a two-port: their rotations, in space also where the model is planar, the interface, the wrenches."""
     turn, angles = new("turn"), new("rotation_angles")
     for order, per in enumerate(("", "/s", "/s^2")):
@@ -419,7 +437,7 @@ def _ends(new: Maker, uplift: bool) -> dict[str, Block]:
     return {name: builder.build() for name, builder in built.items()}
 
 
-def _balances(new: Maker, uplift: bool) -> dict[str, Block]:
+def _balances(new: Maker) -> dict[str, Block]:
     """Residuals of the balances of a body."""
     return {
         "linear": new("linear")
@@ -435,25 +453,19 @@ def _balances(new: Maker, uplift: bool) -> dict[str, Block]:
     }
 
 
-def make_blocks(planar: bool, uplift: bool = False) -> Blocks:
+def make_blocks(planar: bool, uplift: bool) -> Blocks:
     """The blocks of a planar or spatial model, with or without uplift."""
 
     def new(name: str) -> BlockBuilder:
         return BlockBuilder(name, planar)
 
-    groups = (_parameters, _motion, _interfaces, _rims, _powers, _ends, _balances)
-    blocks = {name: block for group in groups for name, block in group(new, uplift).items()}
-    return Blocks(**blocks, **top_blocks(new))
-
-
-def _points(new: Maker) -> Block:
-    builder = new("points")
-    for name, meaning in (
-        ("lo", "r_k-1,k bottom centre"),
-        ("cm", "r_k centre of mass"),
-        ("up", "r_k,k top centre"),
-        ("sc", "r_kc sphere centre above"),
-    ):
-        for order, unit in (("r", "m"), ("v", "m/s"), ("a", "m/s^2")):
-            builder.vector(f"{order}_{name}", unit, f"{meaning}: {order}", POLAR)
-    return builder.build()
+    return Blocks(
+        **_parameters(new),
+        **_motion(new, uplift),
+        **_interfaces(new),
+        **_rims(new, uplift),
+        **_powers(new),
+        **_ends(new),
+        **_balances(new),
+        **_top(new),
+    )

@@ -1,24 +1,23 @@
-"""One body: its forward pass (kinematics up the stack) and its momentum balances.
+"""One body: its kinematics from those of the body below, and its momentum balances.
 
-Up and down differ by a sign that sits in the arms; base and top plate are the same rows with
-R_0 = 0 below the base and R_n = 0 above the top plate.
+Concave up and down differ by a sign in the distances of `parameters.places`. Base and top plate are bodies like the
+others, with R_0 = 0 below the base and R_n = 0 above the top plate.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import sympy as sp
 
 from .blocks import Blocks
 from .parameters import ValueBlocks, places
-from .program import Program, Vector, add, combine, cross, dot, project, scale, subtract
+from .program import Program, Symbols, Vector, add, combine, cross, dot, project, scale, subtract
 
-Symbols = dict[str, Any]
+LEAST_FORCE = sp.Float("1e-6")
+"""Force of a separated surface [N], so that the direction of its force is defined (docs/uplift.md)."""
 
 
 def sines(p: Program, x: Symbols) -> Symbols:
-    """Sines and cosines of psi and theta: computed once a body, everything else reads them."""
+    """Sines and cosines of psi and theta; other programs read them from the block `body`."""
     return {
         "sp": p.let(sp.sin(x["psi"])),
         "cp": p.let(sp.cos(x["psi"])),
@@ -38,8 +37,8 @@ def basis(p: Program, parent: Symbols, trig: Symbols) -> tuple[Vector, Vector, V
     return t1_new, t2_new, t3_new
 
 
-def turn(p: Program, parent: Symbols, x: Symbols) -> Symbols:
-    """Basis, angular velocities (3.12) and their derivatives; declares the rates of everything."""
+def rotational_motion(p: Program, parent: Symbols, x: Symbols) -> Symbols:
+    """Basis (2.1)-(2.6), angular velocities (3.12) and their derivatives; declares the rates of all symbols."""
     trig = sines(p, x)
     t1, t2, t3 = basis(p, parent, trig)
     w = p.let_vector(add(parent["w"], scale(x["psi1"], parent["t1"]), scale(x["theta1"], t2)), "w")  # (3.12)
@@ -51,14 +50,14 @@ def turn(p: Program, parent: Symbols, x: Symbols) -> Symbols:
     p.declare_rates(parent["t1"], cross(parent["w"], parent["t1"]))  # (2.36)
     for t in (t2, t3):
         p.declare_rates(t, p.let_vector(cross(w, t), "dt"))  # (2.36)
-    # omega follows from its own statement, not from a declared rate: d omega/dt is derived, not typed.
+    # No rate of w and wp is declared: their derivatives, printed from (2.56) on, follow from (3.12).
     al = p.rate_vector(w)
     alp = p.rate_vector(wp)
     return {"t1": t1, "t2": t2, "t3": t3, "w": w, "wp": wp, "al": al, "alp": alp, **trig}
 
 
 def point(p: Program, centre: Vector, distance: sp.Expr, t3: Vector) -> tuple[Vector, Vector, Vector]:
-    """Position centre + distance * t3 with velocity and acceleration, obtained by differentiation."""
+    """Position centre + distance * t3; velocity and acceleration, printed from (2.37) on, by differentiation."""
     r = add(centre, scale(distance, t3))
     v = p.rate_vector(r)
     return p.let_vector(r, "r"), v, p.rate_vector(v)
@@ -84,7 +83,7 @@ def forward(b: Blocks) -> Program:
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     up: Symbols = p.read(b.body, "u", active=("t1", "t2", "t3", "w", "al", "C", "V", "A"))
     x: Symbols = p.read(b.coordinates, "x", active=True)
-    out = turn(p, up, x)
+    out = rotational_motion(p, up, x)
     centre = centre_below(p, up, x)
     out["C"], out["V"], out["A"] = point(p, centre, par["e"], out["t3"])
     out["rc"], out["vc"], out["ac"] = point(p, centre, par["c"], out["t3"])
@@ -93,13 +92,13 @@ def forward(b: Blocks) -> Program:
 
 
 def named_points(b: Blocks, values: ValueBlocks) -> Program:
-    """All named points of one body (3.4)-(3.11) with velocity and acceleration."""
-    p = Program("named_points", "named points of body k: (3.4)-(3.11) with velocity and acceleration")
+    """All named points of one body (3.2)-(3.11) with velocity and acceleration."""
+    p = Program("named_points", "named points of body k: (3.2)-(3.11) with velocity and acceleration")
     v: Symbols = p.read(values.body_values, "l", active=False)
     s: Symbols = p.read(values.sides, "s", active=False)
     up: Symbols = p.read(b.body, "u", active=False)
     x: Symbols = p.read(b.coordinates, "x", active=False)
-    t3 = turn(p, up, x)["t3"]
+    t3 = rotational_motion(p, up, x)["t3"]
     centre = centre_below(p, up, x)
     distances = {name: p.let(distance) for name, distance in places(v, s).items()}
     out: Symbols = {}
@@ -110,7 +109,7 @@ def named_points(b: Blocks, values: ValueBlocks) -> Program:
 
 
 def weight_and_inertia(p: Program, par: Symbols, body: Symbols, massless: bool) -> Vector:
-    """M (a + g E3): what the interface below must carry more than the one above."""
+    """Force below a body less the force above it, m (a + g E3): (3.26), (3.28)."""
     gravity: Vector = (sp.Integer(0), sp.Integer(0), par["g"])
     acceleration = gravity if massless else add(body["ac"], gravity)
     return p.let_vector(scale(par["m"], acceleration), "inertia")
@@ -121,8 +120,8 @@ def interface_force(b: Blocks, massless: bool) -> Program:
     p = Program("interface_force", "force below a body from the force above: (3.26), (3.28), summed from the top down")
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=("ac",))
-    above: Symbols = p.read(b.vector, "up")
-    p.write(b.vector, {"F": add(above["F"], weight_and_inertia(p, par, body, massless))})
+    above: Symbols = p.read(b.force, "up")
+    p.write(b.force, {"F": add(above["F"], weight_and_inertia(p, par, body, massless))})
     return p
 
 
@@ -131,8 +130,8 @@ def linear_balance(b: Blocks, massless: bool) -> Program:
     p = Program("linear_balance", "balance of linear momentum (3.26), (3.28): left side less right side")
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=("ac",))
-    below: Symbols = p.read(b.vector, "lo")
-    above: Symbols = p.read(b.vector, "up")
+    below: Symbols = p.read(b.force, "lo")
+    above: Symbols = p.read(b.force, "up")
     p.write(b.linear, {"r": add(weight_and_inertia(p, par, body, massless), subtract(above["F"], below["F"]))})
     return p
 
@@ -150,9 +149,9 @@ def angular_balance(b: Blocks, massless: bool) -> Program:
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     active = ("t1", "t2", "t3") if massless else ("t1", "t2", "t3", "wp", "alp")
     body: Symbols = p.read(b.body, "b", active=active)
-    below: Symbols = p.read(b.vector, "lo")
+    below: Symbols = p.read(b.force, "lo")
     moment_below: Symbols = p.read(b.moment, "ml")
-    above: Symbols = p.read(b.vector, "up")
+    above: Symbols = p.read(b.force, "up")
     moment_above: Symbols = p.read(b.moment, "mu")
     t3 = body["t3"]
     lever = p.let(par["e"] - par["c"])
@@ -177,7 +176,7 @@ def balances(b: Blocks, spin_locked: bool) -> Program:
 
 
 def rate_of_angular_momentum(p: Program, par: Symbols, body: Symbols) -> Vector:
-    """J d omega'/dt + omega' x J omega' with J of (2.118), lambda_1 = lambda_2."""
+    """J d omega'/dt + omega' x J omega', left side of (3.27), (3.29), with J of (2.118), lambda_1 = lambda_2."""
     t3, wp, alp = body["t3"], body["wp"], body["alp"]
     difference = p.let(par["ja"] - par["jt"])
     spin, spin_rate = p.let(dot(t3, wp)), p.let(dot(t3, alp))
@@ -191,7 +190,7 @@ def rate_of_angular_momentum(p: Program, par: Symbols, body: Symbols) -> Vector:
 
 
 def body_energy(b: Blocks, massless: bool) -> Program:
-    """Kinetic and potential energy of one body in the frame that moves with the base, and the power of the frame."""
+    """Kinetic and potential energy of one body relative to the base, and the power of the base acceleration."""
     p = Program("body_energy", "energy of a body in the frame moving with the base")
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
@@ -204,7 +203,7 @@ def body_energy(b: Blocks, massless: bool) -> Program:
 
 
 def energy_terms(p: Program, par: Symbols, body: Symbols, r: Vector, v: Vector, base: Symbols) -> Symbols:
-    """Energies of a rigid axisymmetric body whose centre of mass is at r with velocity v."""
+    """The fields of `energy` for a rigid axisymmetric body whose centre of mass is at r with velocity v."""
     relative = p.let_vector(subtract(v, base["U"]), "v")
     spin = p.let(dot(body["t3"], body["wp"]))
     rotation = (par["jt"] * dot(body["wp"], body["wp"]) + (par["ja"] - par["jt"]) * spin**2) / 2
@@ -215,7 +214,7 @@ def energy_terms(p: Program, par: Symbols, body: Symbols, r: Vector, v: Vector, 
     }
 
 
-def to_world(b: Blocks) -> Program:
+def moment_to_world(b: Blocks) -> Program:
     """Moment of an interface from the basis of the body below to E."""
     p = Program("moment_to_world", "moment about the sphere centre: from the basis of the body below to E")
     body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
@@ -224,17 +223,18 @@ def to_world(b: Blocks) -> Program:
     return p
 
 
-def relative_turning(p: Program, above: Symbols, x: Symbols, lower: Symbols) -> Vector:
-    """omega'_above - omega'_below in the basis of the body below: (3.12); `x`, `lower` are coordinates of the two."""
+def tilted_axis(p: Program, sin_psi: sp.Expr, cos_psi: sp.Expr, sin_theta: sp.Expr, cos_theta: sp.Expr) -> Vector:
+    """t_3 after the rotations psi and theta, along the basis before them: (2.3)-(2.6)."""
+    return sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta)
+
+
+def relative_angular_velocity(p: Program, above: Symbols, x: Symbols, lower: Symbols) -> Vector:
+    """omega'_above - omega'_below (3.12) in the basis of the body below; x, lower: coordinates of above and below."""
     sin_psi, cos_psi, sin_theta, cos_theta = above["sp"], above["cp"], above["st"], above["ct"]
     zero = sp.Integer(0)
     t2: Vector = (zero, cos_psi, sin_psi)
-    t3: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))
+    t3 = tilted_axis(p, sin_psi, cos_psi, sin_theta, cos_theta)
     return add((x["psi1"], zero, -lower["phi1"]), scale(x["theta1"], t2), scale(x["phi1"], t3))
-
-
-LEAST_FORCE = sp.Float("1e-6")
-"""What a parted surface still carries [N], so that the direction of its force is defined (docs/uplift.md)."""
 
 
 def slip_rotation(b: Blocks) -> Program:
@@ -244,11 +244,11 @@ def slip_rotation(b: Blocks) -> Program:
     x: Symbols = p.read(b.coordinates, "x", active=("psi1", "theta1", "phi1"))
     lower: Symbols = p.read(b.coordinates, "y", active=("phi1",))
     tilt = {"tilt": above["cp"] * above["ct"]} if "tilt" in b.relative.quantities else {}
-    p.write(b.relative, {"dw": relative_turning(p, above, x, lower), **tilt})
+    p.write(b.relative, {"dw": relative_angular_velocity(p, above, x, lower), **tilt})
     return p
 
 
-def to_local(b: Blocks, uplift: bool, rims: bool) -> Program:
+def surface_local(b: Blocks, uplift: bool, rims: bool) -> Program:
     """Contact force and relative angular velocity of a surface in the basis of the body below it."""
     p = Program(
         "surface_local", "contact force and omega'_above - omega'_below in the basis of the body below (3.12), (3.19)"
@@ -257,9 +257,9 @@ def to_local(b: Blocks, uplift: bool, rims: bool) -> Program:
     above: Symbols = p.read(b.body, "a", active=("sp", "cp", "st", "ct"))
     x: Symbols = p.read(b.coordinates, "x", active=("psi1", "theta1", "phi1"))
     lower: Symbols = p.read(b.coordinates, "y", active=("phi1",))
-    total: Symbols = p.read(b.vector, "tot")
+    total: Symbols = p.read(b.force, "tot")
     least: Vector = (sp.Integer(0), sp.Integer(0), LEAST_FORCE if uplift else sp.Integer(0))
-    relative = relative_turning(p, above, x, lower)
+    relative = relative_angular_velocity(p, above, x, lower)
     contact = project((body["t1"], body["t2"], body["t3"]), total["F"])
     if rims:
         rim: Symbols = p.read(b.rim, "rim", active=("f",))

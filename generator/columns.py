@@ -1,38 +1,50 @@
 """Columns of the tangent of the condensed equations: the variation of one body with one unknown.
 
-A tilt of a body turns it, and all bodies above it, about the sphere centre below it: a twist (rotation and
-translation, each with two time derivatives) that is the same for every body above. In the body-fixed frame the basis
-of a body does not change under it; only its angular velocity and acceleration do. A column therefore costs a few
-products per body, however many bodies lie below (docs/model.md, "The tangent"). The variation of the surface below a
-body with the unknowns of that body is added (`local_variation`).
+A tilt of a body rotates it, and all bodies above it, about the sphere centre below it. This twist (rotation and
+translation, each with two time derivatives) is the same for every body above. In the body-fixed frame it changes the
+angular velocity and acceleration of a body, not its basis. A column therefore costs a few products per body, however
+many bodies lie below (docs/model.md, "The tangent"). `local_variation` adds the change of the surface below the tilted
+body.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import sympy as sp
 
 from .blocks import Blocks
-from .body import rate_of_angular_momentum, relative_turning
+from .body import rate_of_angular_momentum, relative_angular_velocity
 from .contact import contact_basis
-from .program import AXIAL, POLAR, Block, BlockBuilder, Program, Vector, add, cross, project, scale, subtract
+from .program import (
+    AXIAL,
+    POLAR,
+    ZERO,
+    Block,
+    BlockBuilder,
+    Program,
+    Symbols,
+    Vector,
+    add,
+    cross,
+    project,
+    scale,
+    subtract,
+)
 
-Symbols = dict[str, Any]
 ORDERS = (0, 1, 2)
 TILTS = {"psi": ("sp", "cp"), "theta": ("st", "ct")}
 """Tilt angles of a body, with the fields of a body that hold their sine and cosine."""
 
 
-def repeated(block: Block, name: str, unknowns: tuple[str, ...]) -> Block:
-    """The fields of `block` once per unknown, one after the other."""
+def repeated(block: Block, name: str, angles: tuple[str, ...]) -> Block:
+    """The fields of `block` once per unknown angle, one after the other."""
     return Block(
         name,
-        tuple(replace(f, name=f"{u}_{f.name}") for u in unknowns for f in block.fields),
+        tuple(replace(f, name=f"{u}_{f.name}") for u in angles for f in block.fields),
         {
             f"{u}_{quantity}": tuple(f"{u}_{part}" if isinstance(part, str) else part for part in parts)
-            for u in unknowns
+            for u in angles
             for quantity, parts in block.quantities.items()
         },
     )
@@ -50,8 +62,8 @@ class Columns:
     turning: Block
 
 
-def column_blocks(b: Blocks, planar: bool, unknowns: tuple[str, ...]) -> Columns:
-    """The blocks of the columns of a model whose bodies have these unknowns."""
+def column_blocks(b: Blocks, planar: bool, angles: tuple[str, ...]) -> Columns:
+    """The blocks of the columns of a model. angles: of a body, those whose accelerations are unknown."""
     seed = BlockBuilder("seed", planar)
     axis = BlockBuilder("axis", planar)
     axis.vector("t", "-", "unit vector along the axis of a tilt angle", AXIAL)
@@ -75,11 +87,11 @@ def column_blocks(b: Blocks, planar: bool, unknowns: tuple[str, ...]) -> Columns
     variation.vector("F", "N", "the same variation along E1, E2, E3", POLAR)
     variation.vector("M", "N m", "variation of the moment of the surface, basis of the body above", AXIAL)
     turning = BlockBuilder("turning", planar)
-    for block in (variation, turning) if "phi" in unknowns else (turning,):
+    for block in (variation, turning) if "phi" in angles else (turning,):
         block.vector("wp", "rad/s", "omega', with spin (3.12)", AXIAL)
         block.vector("alp", "rad/s^2", "d omega'/dt", AXIAL)
     local = variation.build()
-    variations = repeated(local, "variations", unknowns)
+    variations = repeated(local, "variations", angles)
     return Columns(seed.build(), axis.build(), twist.build(), local, variations, turning.build())
 
 
@@ -141,13 +153,13 @@ def transported_force(b: Blocks, c: Columns, massless: bool) -> Program:
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
     s: Symbols = p.read(c.twist, "s")
-    above: Symbols = p.read(b.vector, "up")
+    above: Symbols = p.read(b.force, "up")
     gravity: Vector = (sp.Integer(0), sp.Integer(0), par["g"])
     asked = subtract(gravity, cross(s["q0"], gravity))
     if not massless:
         twice = scale(sp.Integer(2), cross(s["q1"], body["vc"]))
         asked = add(asked, body["ac"], cross(s["q2"], body["rc"]), twice, s["t2"])
-    p.write(b.vector, {"F": add(above["F"], scale(par["m"], asked))})
+    p.write(b.force, {"F": add(above["F"], scale(par["m"], asked))})
     return p
 
 
@@ -158,7 +170,7 @@ def transported_wrench(b: Blocks, c: Columns) -> Program:
     )
     body: Symbols = p.read(b.body, "b", active=False)
     s: Symbols = p.read(c.twist, "s")
-    force: Symbols = p.read(b.vector, "f")
+    force: Symbols = p.read(b.force, "f")
     moment: Symbols = p.read(b.moment, "m")
     seen = subtract(moment["M"], cross(s["q0"], moment["M"]))
     basis = (body["t1"], body["t2"], body["t3"])
@@ -170,8 +182,8 @@ def force_to_local(b: Blocks) -> Program:
     """Interface force of a surface in the basis of the body below."""
     p = Program("force_to_local", "force: from E to the basis of the body below")
     body: Symbols = p.read(b.body, "b", active=False)
-    force: Symbols = p.read(b.vector, "f")
-    p.write(b.vector, {"F": project((body["t1"], body["t2"], body["t3"]), force["F"])})
+    force: Symbols = p.read(b.force, "f")
+    p.write(b.force, {"F": project((body["t1"], body["t2"], body["t3"]), force["F"])})
     return p
 
 
@@ -186,9 +198,9 @@ def turning_balance(b: Blocks, c: Columns, massless: bool, rows: int) -> Program
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
     turning: Symbols = p.read(c.turning, "w", active=() if massless else ("wp", "alp"))
-    below: Symbols = p.read(b.vector, "lo")
+    below: Symbols = p.read(b.force, "lo")
     moment_below: Symbols = p.read(b.moment, "ml")
-    above: Symbols = p.read(b.vector, "up")
+    above: Symbols = p.read(b.force, "up")
     moment_above: Symbols = p.read(b.moment, "mu")
     lever = p.let(par["e"] - par["c"])
     weighted = p.let_vector(add(scale(par["c"], below["F"]), scale(lever, above["F"])), "g")
@@ -203,7 +215,7 @@ def turning_balance(b: Blocks, c: Columns, massless: bool, rows: int) -> Program
     return p
 
 
-def local_variation(b: Blocks, c: Columns, unknowns: tuple[str, ...]) -> Program:
+def local_variation(b: Blocks, c: Columns, angles: tuple[str, ...]) -> Program:
     """Derivatives of slip, force and moment of the surface below a body with respect to each unknown of that body."""
     p = Program("local_variation", "variation of the surface below a body with the unknowns of that body")
     s: Symbols = p.read(c.seed, "s", active=False)
@@ -211,17 +223,16 @@ def local_variation(b: Blocks, c: Columns, unknowns: tuple[str, ...]) -> Program
     body: Symbols = p.read(b.body, "b", active=False)
     x: Symbols = p.read(b.coordinates, "x", active=False)
     lower: Symbols = p.read(b.coordinates, "y", active=False)
-    force: Symbols = p.read(b.vector, "f", active=False)
+    force: Symbols = p.read(b.force, "f", active=False)
     moment: Symbols = p.read(b.moment, "m", active=False)
     below = (up["t1"], up["t2"], up["t3"])
     seen = p.let_vector(project(basis_above(p, body), moment["M"]), "seen")
-    slip = p.let_vector(relative_turning(p, body, x, lower), "dw")
+    slip = p.let_vector(relative_angular_velocity(p, body, x, lower), "dw")
     tilt = p.let(body["cp"] * body["ct"])
-    zero: Vector = (sp.Integer(0),) * 3
     out: Symbols = {}
-    for angle in unknowns:
+    for angle in angles:
         p.rates = {x[f"{angle}1"]: s["s1"]}
-        turning, wp, alp = zero, zero, zero
+        turning, wp, alp = ZERO, ZERO, ZERO
         if angle not in TILTS:  # spin
             wp = scale(s["s1"], body["t3"])
             alp = add(scale(s["s2"], body["t3"]), scale(s["s1"], cross(body["w"], body["t3"])))
@@ -245,7 +256,7 @@ def local_variation(b: Blocks, c: Columns, unknowns: tuple[str, ...]) -> Program
     return p
 
 
-def programs(b: Blocks, c: Columns, massless: bool, unknowns: tuple[str, ...]) -> list[Program]:
+def programs(b: Blocks, c: Columns, massless: bool, angles: tuple[str, ...]) -> list[Program]:
     """All programs of the columns of the tangent."""
     return [
         twist(c),
@@ -254,6 +265,6 @@ def programs(b: Blocks, c: Columns, massless: bool, unknowns: tuple[str, ...]) -
         transported_force(b, c, massless),
         transported_wrench(b, c),
         force_to_local(b),
-        turning_balance(b, c, massless, len(unknowns)),
-        local_variation(b, c, unknowns),
+        turning_balance(b, c, massless, len(angles)),
+        local_variation(b, c, angles),
     ]

@@ -6,7 +6,6 @@ All vectors have components along the basis t_i of the body below the surface.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import sympy as sp
 
@@ -15,11 +14,11 @@ from msfp_gen.specification.friction_laws import Spin
 
 from . import laws
 from .blocks import Blocks
+from .body import tilted_axis
 from .functions import ArcTan2, Modulus, Select
 from .laws import Shear, friction_rates
-from .program import Program, Vector, add, combine, cross, dot, project, scale
+from .program import Program, Symbols, Vector, add, combine, cross, dot, project, scale
 
-Symbols = dict[str, Any]
 ALIGNED = sp.Float("1e-9")
 """Sine of a tilt, and distance [m], below which the direction of a rim force is not resolved."""
 
@@ -52,14 +51,13 @@ def contact_basis(p: Program, sin_psi: sp.Expr, cos_psi: sp.Expr, sin_theta: sp.
     zero = sp.Integer(0)
     t1: Vector = (cos_theta, p.let(sin_psi * sin_theta), p.let(-cos_psi * sin_theta))
     t2: Vector = (zero, cos_psi, sin_psi)
-    t3: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))
-    return t1, t2, t3
+    return t1, t2, tilted_axis(p, sin_psi, cos_psi, sin_theta, cos_theta)
 
 
 def slip(
     p: Program, friction_model: FrictionModel, par: Symbols, base: Basis, shear: Shear, dw: Vector
 ) -> tuple[sp.Expr, Symbols]:
-    """Signed radius sign R, and the slip velocity u, v (3.19), (2.98) with the rates of the friction state (3.18)."""
+    """Signed radius sign R, and slip velocity u, v (2.98), (3.19) with the rates of the friction state (3.18)."""
     t1, t2, _ = base
     signed_radius = p.let(par["sign"] * par["R"])
     # (3.19): v~ = -sign R dw x t~_3; its components (2.98) by the triple product.
@@ -156,7 +154,7 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
     signed_radius, rates = slip(p, friction_model, par, base, shear, loc["dw"])
     out = {**rates, **friction(p, friction_model, unknown, base, N, g, loc["dw"], signed_radius)}
     law = friction_model.coefficient
-    out |= laws.law_results(p, law, par, unknown, stage, loc, N, shear.kept, rates)
+    out |= laws.law_results(p, law, par, unknown, stage, loc, N, shear.df_dg, rates)
     values = {**out, **f, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_}
     p.write(
         b.contact,
@@ -219,7 +217,7 @@ def report_wrench(b: Blocks, rims: bool) -> Program:
 
 
 def rim_coordinates(b: Blocks) -> Program:
-    """What the gap of a rim depends on: the tilts of the body above, and with uplift the separation of the surface."""
+    """Coordinates of the gap of a rim: the tilts of the body above, and with uplift the separation of the surface."""
     p = Program("rim_coordinates", "coordinates on which the gap of a rim depends")
     body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3", "w"))
     angles = ("psi", "theta", "psi1", "theta1")
@@ -249,7 +247,7 @@ def rim(b: Blocks) -> Program:
     x: Symbols = p.read(b.rim_coordinates, "x")
     sin_psi, cos_psi = p.let(sp.sin(x["psi"])), p.let(sp.cos(x["psi"]))
     sin_theta, cos_theta = p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))
-    above: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))  # t_3 of the body above
+    above = tilted_axis(p, sin_psi, cos_psi, sin_theta, cos_theta)
     below: Vector = (sp.Integer(0), sp.Integer(0), sp.Integer(1))
     cosine = above[2]
     for angle in ("psi", "theta"):
@@ -257,11 +255,11 @@ def rim(b: Blocks) -> Program:
             p.rates[x[angle]] = x[f"{angle}1"]
     up = p.let((1 + par["sign"]) / 2)
     down = p.let((1 - par["sign"]) / 2)
-    # (3.24): the axis of the other body, projected on the face of the slider and normalised below.
+    # (3.24), without its denominator: the axis of the other body, projected on the face of the slider.
     toward = add(scale(p.let(up - down * cosine), below), scale(p.let(down - up * cosine), above))
     slider = add(scale(up, above), scale(down, below))
     dish = add(scale(down, above), scale(up, below))
-    lever = p.let(par["R"] - par["pr"])  # (3.25); the component r f_b is parallel to the force and has no moment
+    lever = p.let(par["R"] - par["pr"])  # (3.25); the part along the direction of the force has no moment
     separation: Vector | None = x.get("d")
     if separation is None:
         sine = p.let(norm(above[0], above[1]))  # |t_3 x t_3'|, for arccos of (3.20)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from msfp_gen.specification.layout import ModelSpec
 
-from . import body, columns, contact, energy, laws, parameters, seat, top, two_port
+from . import body, columns, contact, energy, laws, parameters, top, two_port, unilateral
 from .blocks import Blocks, make_blocks
 from .program import Program
 
@@ -20,6 +20,8 @@ class Equations:
         blocks: records that the programs exchange.
         programs: straight-line programs of one body, one surface and the top plate.
         value_blocks: the values from which their parameters are made.
+        column_blocks: blocks of the tangent where an unknown moves all bodies above as one rigid body; None with
+            uplift.
     """
 
     spec: ModelSpec
@@ -27,12 +29,11 @@ class Equations:
     programs: tuple[Program, ...]
     value_blocks: parameters.ValueBlocks
     column_blocks: columns.Columns | None = None
-    """Blocks of the tangent where an unknown moves all bodies above as one rigid body; None with uplift."""
 
     @property
-    def unknowns(self) -> tuple[str, ...]:
-        """Names of the coordinates of one body whose accelerations are unknown."""
-        return unknowns(self.spec)
+    def unknown_angles(self) -> tuple[str, ...]:
+        """Names of the angles of one body whose accelerations are unknown."""
+        return unknown_angles(self.spec)
 
     @property
     def separations(self) -> tuple[str, ...]:
@@ -42,8 +43,8 @@ class Equations:
         return ("dx", "dz") if self.spec.effects.dimension == "planar" else ("dx", "dy", "dz")
 
 
-def unknowns(spec: ModelSpec) -> tuple[str, ...]:
-    """Names of the coordinates of one body whose accelerations are unknown."""
+def unknown_angles(spec: ModelSpec) -> tuple[str, ...]:
+    """Names of the angles of one body whose accelerations are unknown."""
     if spec.effects.dimension == "planar":
         return ("theta",)
     return ("psi", "theta") if spec.effects.spin == "locked" else ("psi", "theta", "phi")
@@ -56,20 +57,20 @@ def derive(spec: ModelSpec) -> Equations:
     surface = laws.with_fields(blocks.surface_parameters, parameters.number_fields(effects))
     blocks = laws.add_law_fields(replace(blocks, surface_parameters=surface), effects.law)
     values = parameters.value_blocks(effects)
-    law = contact.FrictionModel(effects.bouc_wen, effects.drilling, effects.law)
+    friction_model = contact.FrictionModel(effects.bouc_wen, effects.drilling, effects.law)
     massless = effects.sliders == "massless"
     programs = [
         *parameters.programs(blocks, values, effects),
         body.forward(blocks),
         body.named_points(blocks, values),
-        body.to_local(blocks, effects.uplift, effects.rims),
-        contact.contact(blocks, law),
+        body.surface_local(blocks, effects.uplift, effects.rims),
+        contact.contact(blocks, friction_model),
         body.slip_rotation(blocks),
-        contact.report_contact(blocks, law),
+        contact.report_contact(blocks, friction_model),
         contact.report_wrench(blocks, effects.rims),
         contact.contact_stage(blocks),
         contact.surface_moment(blocks, effects.rims),
-        body.to_world(blocks),
+        body.moment_to_world(blocks),
         body.interface_force(blocks, massless),
         body.linear_balance(blocks, massless),
         body.angular_balance(blocks, massless),
@@ -82,7 +83,6 @@ def derive(spec: ModelSpec) -> Equations:
         top.top_energy(blocks),
         contact.gap(blocks),
         *energy.programs(blocks, effects.rims, effects.uplift, effects.top_rotation),
-        two_port.rotation_angles(blocks),
         *two_port.programs(blocks),
     ]
     if effects.top_rotation:
@@ -92,8 +92,8 @@ def derive(spec: ModelSpec) -> Equations:
     if effects.rims:
         programs += [contact.rim_coordinates(blocks), contact.rim(blocks)]
     if effects.uplift:
-        programs += seat.programs(blocks, effects.rims)
+        programs += unilateral.programs(blocks, effects.rims)
         return Equations(spec, blocks, tuple(programs), values)
-    column_blocks = columns.column_blocks(blocks, effects.dimension == "planar", unknowns(spec))
-    programs += columns.programs(blocks, column_blocks, massless, unknowns(spec))
+    column_blocks = columns.column_blocks(blocks, effects.dimension == "planar", unknown_angles(spec))
+    programs += columns.programs(blocks, column_blocks, massless, unknown_angles(spec))
     return Equations(spec, blocks, tuple(programs), values, column_blocks)

@@ -84,7 +84,7 @@ class Form:
     """Directional derivatives by one set of directions.
 
     Attributes:
-        name: that of the member of `InC`, and of the beginning of that of `List`, with C of the derivatives.
+        name: of the member of `InC` with C of the derivatives; that of `List` is the same with `_in_c`.
         kernels: name of a program -> its derivatives.
         read: the lists whose values these contain.
     """
@@ -100,7 +100,7 @@ def _form(name: str, suffix: str, schedule: Schedule, kernels: Iterable[Kernel])
 
 
 def schedule_context(equations: Equations, directional: Iterable[Kernel], by_ends: Iterable[Kernel]) -> dict[str, Any]:
-    """What the templates of the schedules need. directional, by_ends: the kernels of a model that has these."""
+    """Variables of the templates of the schedules. directional, by_ends: the kernels of a model that has these."""
     effects, programs = equations.spec.effects, {program.name: program for program in equations.programs}
     balances, with_directions = momentum_balances(effects), {**condensed(effects), **energies(effects)}
     port, of_ends = two_port(effects), {**condensed(effects), **two_port(effects)}
@@ -234,7 +234,7 @@ def _declared(one: List, equations: Equations) -> dict[str, str]:
 
 
 def _entries(name: str, quantities: Iterable[str], equations: Equations) -> dict[str, Any]:
-    """Where the fields of a kind of variable are in the block of a list; -1: nowhere, as E2 in the plane."""
+    """Indices of the fields of a kind of variable in the block of a list; -1: not stored, as E2 in the plane."""
     one = LISTS[name]
     block: Block = getattr(equations.blocks, one.kind)
     index = {field.name: i for i, field in enumerate(block.fields)}

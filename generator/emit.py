@@ -1,4 +1,4 @@
-"""Emit: kernels and blocks as text, through strict Jinja2 templates."""
+"""The generated files of a model: kernels, blocks and drivers as text, by the Jinja2 templates of `templates/`."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ def lanes(surfaces: int) -> int:
 
 
 def description(spec: ModelSpec) -> str:
-    """What the wrapper states about a model, as JSON. The wrapper itself is the same text for every model."""
+    """Description of a model for the wrapper, as JSON. The wrapper itself is the same text for every model."""
     shape = shape_of(spec)
     return json.dumps(
         {
@@ -254,7 +254,7 @@ def emit(
         "nb": spec.layout.surfaces,
         "lanes": lanes(spec.layout.surfaces),
         "description": json.dumps(description(spec)),
-        "unknowns": equations.unknowns,
+        "unknown_angles": equations.unknown_angles,
         "separations": equations.separations,
         "vectors": vector_quantities,
         "scalars": scalar_quantities,
@@ -262,7 +262,7 @@ def emit(
         + len(equations.blocks.shear.fields)
         + (law is not None),
         "law": law,
-        "flows": spec.effects.permits_quasistatic_steps,
+        "closed_form": spec.effects.permits_quasistatic_steps,
         "heat": HEAT_KERNEL,
         "words": word_enums(),
         "row": contract.row(spec.effects),

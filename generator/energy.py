@@ -5,15 +5,11 @@ Energies are relative to the frame that translates with the base (docs/model.md,
 
 from __future__ import annotations
 
-from typing import Any
-
 import sympy as sp
 
 from .blocks import Blocks
 from .functions import Step
-from .program import Program, cross, dot, subtract
-
-Symbols = dict[str, Any]
+from .program import Program, Symbols, cross, dot, subtract
 
 
 def friction_power(b: Blocks) -> Program:
@@ -58,7 +54,7 @@ def rim_energy(b: Blocks) -> Program:
     return p
 
 
-def _top(p: Program, b: Blocks, rotating_support: bool) -> tuple[Symbols, Symbols, Symbols, Symbols]:
+def _read_top(p: Program, b: Blocks, rotating_support: bool) -> tuple[Symbols, Symbols, Symbols, Symbols]:
     """Inputs of the programs of the top: parameters, plate, foot, and axis and angular velocity of the support."""
     par: Symbols = p.read(b.top_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
@@ -72,7 +68,7 @@ def _top(p: Program, b: Blocks, rotating_support: bool) -> tuple[Symbols, Symbol
 def restraint(b: Blocks, rotating_support: bool) -> Program:
     """Energy of the springs of the top, and the compression of the vertical one."""
     p = Program("restraint", "energy of the springs of the top; compression of the vertical spring")
-    par, body, foot, support = _top(p, b, rotating_support)
+    par, body, foot, support = _read_top(p, b, rotating_support)
     x, y, _ = subtract(body["C"], par["x0"])
     settlement = p.let(body["C"][2] - foot["y"])
     tilted = subtract(body["t3"], support["e"])
@@ -85,10 +81,10 @@ def restraint(b: Blocks, rotating_support: bool) -> Program:
 def top_power(b: Blocks, rotating_support: bool) -> Program:
     """Powers of the load on the top plate, of its supports, and of its dampers."""
     p = Program("top_power", "powers of load, moving supports, spin and dampers at the top plate")
-    par, body, foot, support = _top(p, b, rotating_support)
+    par, body, foot, support = _read_top(p, b, rotating_support)
     coordinates: Symbols = p.read(b.coordinates, "x", active=False)
     base: Symbols = p.read(b.base_motion, "base", active=False)
-    force: Symbols = p.read(b.vector, "fe", active=False)
+    force: Symbols = p.read(b.force, "fe", active=False)
     moment: Symbols = p.read(b.moment, "me", active=False)
     C, V, U, wp = body["C"], body["V"], base["U"], body["wp"]
     load = p.let(dot(force["F"], subtract(V, U)) + dot(moment["M"], wp))
@@ -119,7 +115,7 @@ def base_power(b: Blocks) -> Program:
     p = Program("base_power", "power of a rotating base")
     body: Symbols = p.read(b.body, "b", active=False)
     base: Symbols = p.read(b.base_motion, "base", active=False)
-    force: Symbols = p.read(b.vector, "f", active=False)
+    force: Symbols = p.read(b.force, "f", active=False)
     moment: Symbols = p.read(b.moment, "m", active=False)
     power = dot(force["F"], subtract(body["V"], base["U"])) + dot(moment["M"], body["wp"])
     p.write(b.power, {"power": power}, tangents=False)

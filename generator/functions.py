@@ -1,4 +1,4 @@
-"""Functions that SymPy lacks or differentiates to distributions, and C text of expressions; `latex.py` is for pages."""
+"""Functions that SymPy lacks or differentiates to distributions, and C text of expressions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Step(sp.Function):  # type: ignore[misc]
 
 
 class Select(sp.Function):  # type: ignore[misc]
-    """Of three arguments the second where the first is positive, else the third, to which the derivative belongs."""
+    """The second of three arguments where the first is positive, else the third; so is the derivative."""
 
     nargs = 3
 
@@ -139,5 +139,5 @@ _PRINTER = Printer()
 
 @cache
 def to_c(expression: sp.Expr) -> str:
-    """C text of one expression. Kept, since models share most of their statements."""
+    """C text of one expression, cached, since models share most of their statements."""
     return str(_PRINTER.doprint(expression))

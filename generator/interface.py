@@ -78,7 +78,7 @@ def text_in_c(status: contract.Status) -> str:
 
 
 def interface_context(spec: ModelSpec, shape: Any, header: str) -> dict[str, Any]:
-    """What the templates of the public interface need; shape: of a quantity, in numbers; header: text of `msfp.h`."""
+    """Variables of the templates of the public interface. shape: of a quantity in numbers; header: text of `msfp.h`."""
     symbols = runtime_symbols()
     lists = {"row": contract.row(spec.effects), "extremes": contract.extremes(spec.effects)}
     meanings = {"row": "One row of output", "extremes": "Extremes of a run over all of its accepted steps"}
@@ -127,7 +127,7 @@ _IN_C = {"pi": "MSFP_PI", "asin": "msfp_asin"}  # words of a limit that are no v
 
 
 def checks_context(spec: ModelSpec) -> dict[str, Any]:
-    """What the template of the checks needs."""
+    """Variables of the template of the checks."""
     surface = surface_values(spec)
     words = _IN_C | {
         value.name: f"{kind}[{_index(kind, value)}]"
@@ -165,7 +165,7 @@ def _place(value: Value) -> str:
 
 
 def _range(value: Value, of: str = "", at: str = "0") -> tuple[str, str, str, int, int, str]:
-    """Where it is, the least and the largest number, whether 0 is one too, whether the base has none, the message."""
+    """Place in C, least and largest number, whether 0 is permitted too, whether the base has no such value, message."""
     rule, (least, most) = value.rule, value.rule.limits
     if rule.computed:  # any that is as large as that
         least, most = (-inf if least < 0 else least), inf

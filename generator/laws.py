@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import sympy as sp
 
@@ -24,9 +23,8 @@ from msfp_gen.specification.friction_laws import HYSTERESIS, Law, Memory, Spin, 
 
 from .blocks import Blocks
 from .functions import Clamp, Decay, Modulus, Select, Step
-from .program import Block, Field, Program
+from .program import Block, Field, Program, Symbols
 
-Symbols = dict[str, Any]
 ON_THE_EDGE = sp.Float("1e-9")
 """A friction state is on the edge of the unit disc if 1 less its square is at most this."""
 
@@ -39,14 +37,14 @@ class Shear:
         Y, Z: friction state.
         before: Y and Z that the earlier stages of a step give.
         tau: sum of the diagonal entry of the stage formula and the damping time T; T outside of a step [s].
-        kept: derivative of the friction state with respect to the friction force over -mu N.
+        df_dg: derivative of the friction state f with respect to the friction force over -mu N, g.
     """
 
     Y: sp.Expr
     Z: sp.Expr
     before: tuple[sp.Expr, sp.Expr]
     tau: sp.Expr
-    kept: sp.Expr
+    df_dg: sp.Expr
 
 
 def friction_rates(p: Program, law: str, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:
@@ -113,11 +111,14 @@ def plastic_rates(p: Program, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr)
 
 
 def _after_slip(p: Program, plastic: bool, Y: sp.Expr, slip: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Y after a slip, and the work that friction dissipates over it, over mu N d_y.
+    """Y after a slip over d_y, and the work that friction dissipates over it, divided by mu N d_y.
 
-    The work is the integral of Y^3 ds while friction opposes the slip; by the plastic law it is the slip beyond the
-    edge. Along the slip the state is y. Where no slip is left after unloading, the exponential is not used: Y stays
-    exact, and its slope is 1 also at rest.
+    By (3.18) the slip has two parts. While Y u < 0, friction unloads to zero along a straight line. Then Y grows as a
+    hyperbolic tangent, and the work is the integral of Y^3 ds. Where the slip ends in the first part, the exponential
+    is not used: Y stays exact, and its slope is 1 also at rest. By the plastic law the work is the slip beyond the edge
+    of the unit disc.
+
+    In the code y is Y times the direction of the slip, and `left` the slip of the second part.
     """
     if plastic:
         trial = p.let(Y + slip)
@@ -125,13 +126,13 @@ def _after_slip(p: Program, plastic: bool, Y: sp.Expr, slip: sp.Expr) -> tuple[s
         beyond = p.let(trial - end)
         return end, beyond * (Step(beyond) - Step(-beyond))
     direction = p.let(1 - 2 * Step(-slip))
-    y, rest = p.let(direction * Y), p.let(direction * slip)
-    unloading = p.let(y * Step(-y))  # of y; then friction unloads until it is zero
-    start, left = p.let(y - unloading), p.let(rest + unloading)
+    y, length = p.let(direction * Y), p.let(direction * slip)
+    unloading = p.let(y * Step(-y))  # y where it is negative, less the slip of the first part
+    start, left = p.let(y - unloading), p.let(length + unloading)
     above = p.let(1 + start)
     below = p.let((1 - start) * p.let(Decay(p.let(2 * left))))  # 0 at y = 1: saturated friction stays so
     total = p.let(above + below)
-    end = p.let(Select(left, p.let((above - below) / total), p.let(y + rest)))
+    end = p.let(Select(left, p.let((above - below) / total), p.let(y + length)))
     growth = p.let(left + p.let(Select(left, sp.log(total / 2), 0)))
     lost = p.let(growth - p.let(end**2 - start**2) / 2)
     return p.let(direction * end), Select(left, lost, 0)
@@ -241,7 +242,7 @@ def law_results(
     stage: Symbols,
     loc: Symbols,
     N: sp.Expr,
-    kept: sp.Expr,
+    df_dg: sp.Expr,
     slip: Symbols,
 ) -> Symbols:
     """Results that a law adds to `contact`; empty for constant friction.
@@ -258,7 +259,7 @@ def law_results(
         stage: symbols of the block `stage`.
         loc: symbols of the block `contact_frame`.
         N: normal force.
-        kept: derivative of the friction state with respect to the friction force over -mu N.
+        df_dg: as in `Shear`.
         slip: slip velocity with the velocity of plastic slip and its derivatives, of `contact.slip`.
     """
     if law is None:
@@ -276,7 +277,7 @@ def law_results(
     if memory:
         by_memory = partial_derivative(p, mu, results["memory"]) if memory.by_friction else sp.Integer(0)
         results["law_mu"] = p.let(by_memory * stage["gain"] * share)
-    slope = p.let(partial_derivative(p, mu, variables["v"]) * kept)
+    slope = p.let(partial_derivative(p, mu, variables["v"]) * df_dg)
     return results | {f"law_{name}": p.let(slope * slip[f"plastic_{name}"]) for name in ("Y", "Z")}
 
 
@@ -311,13 +312,13 @@ def coefficient(p: Program, law: Law, par: Symbols, variables: Symbols) -> sp.Ex
     return p.let(fold(law.tree, {**par, **variables}, operations(p)), "mu")
 
 
-def drilling_moment(p: Program, way: Spin, par: Symbols, N: sp.Expr, rate: sp.Expr) -> sp.Expr:
+def drilling_moment(p: Program, resistance: Spin, par: Symbols, N: sp.Expr, rate: sp.Expr) -> sp.Expr:
     """Moment that resists spin at this rate, about the contact normal [N m]."""
-    return p.let(fold(way.tree, {**par, "r": par["rs"], "N": N, "w": rate}, operations(p)), "drilling")
+    return p.let(fold(resistance.tree, {**par, "r": par["rs"], "N": N, "w": rate}, operations(p)), "drilling")
 
 
 def start_of(memory: Memory, par: Symbols) -> sp.Expr:
-    """Value of a memory at the start."""
+    """Value of a memory at the start [unit of the memory]."""
     return par[memory.start] if memory.start else sp.Integer(0)
 
 

@@ -192,8 +192,8 @@ DIFFERENTIATED = {
     "slid_friction": False,
     "slip_work": False,
 }
-"""Programs outside of the schedules (`drivers.py`) that are differentiated, and whether the block of their results is
-at hand where this is done."""
+"""Programs that gradients differentiate beside those of their schedules (`drivers.directional_kernels`), and whether
+the block of their results is at hand where this is done."""
 
 
 def _with_all_inputs(use: Use) -> Use:

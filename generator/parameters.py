@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import sympy as sp
 
@@ -14,9 +13,8 @@ from msfp_gen.specification.values import Value
 
 from .blocks import Blocks
 from .functions import Select
-from .program import Block, Field, Program
+from .program import Block, Field, Program, Symbols
 
-Symbols = dict[str, Any]
 WIDEST = sp.Float("1.5")
 """Largest half-angle of a footprint [rad]."""
 
@@ -32,7 +30,14 @@ def _values(kind: str, values: Iterable[Value], more: Iterable[Field] = ()) -> B
 
 @dataclass(frozen=True)
 class ValueBlocks:
-    """The values of a scene as C receives them, and what bodies, surfaces and top take from their surroundings."""
+    """The values of a scene as C receives them, and those that bodies, surfaces and top take from their neighbours.
+
+    Attributes:
+        body_values, surface_values, top_values: of a scene.
+        sides: of a body, from the surfaces below and above it.
+        side: of a surface.
+        around: of the top.
+    """
 
     body_values: Block
     surface_values: Block
@@ -71,17 +76,18 @@ def value_blocks(effects: Effects) -> ValueBlocks:
 
 
 def places(v: Symbols, s: Symbols) -> Symbols:
-    """Distances along t3 from the sphere centre below to the points of a body (3.4)-(3.11)."""
+    """Distances along t3 from the sphere centre below a body, r_01 for the base, to its named points (3.2)-(3.11)."""
     up = (1 + s["sign_lower"]) / 2
     bottom = -s["sign_lower"] * s["radius_lower"]  # (3.5), (3.9)
-    centroid = up * v["centroid"] + (1 - up) * (v["height"] - v["centroid"])  # (3.6), (3.10)
-    top = bottom + v["height"]
-    return {"lo": bottom, "cm": bottom + centroid, "up": top, "sc": top + s["sign_upper"] * s["radius_upper"]}
+    centroid = up * v["centroid"] + (1 - up) * (v["height"] - v["centroid"])  # (3.2), (3.6), (3.10)
+    top = bottom + v["height"]  # (3.3), (3.7), (3.11)
+    centre = top + s["sign_upper"] * s["radius_upper"]  # (3.4), (3.8)
+    return {"lo": bottom, "cm": bottom + centroid, "up": top, "sc": centre}
 
 
 def body_block(b: Blocks, scene_values: ValueBlocks) -> Program:
-    """Parameters of a body: distances along t3 from the positions (3.4)-(3.11), mass and moments of inertia."""
-    p = Program("body_block", "parameters of a body, from (3.4)-(3.11)")
+    """Parameters of a body: distances along t3 from the positions (3.2)-(3.11), mass and moments of inertia."""
+    p = Program("body_block", "parameters of a body, from (3.2)-(3.11)")
     v: Symbols = p.read(scene_values.body_values, "b", active=False)
     s: Symbols = p.read(scene_values.sides, "s", active=False)
     points = places(v, s)
@@ -101,7 +107,7 @@ def body_block(b: Blocks, scene_values: ValueBlocks) -> Program:
 
 
 def surface_block(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> Program:
-    """Parameters of a surface, of which its slider gives the edge that meets the rim."""
+    """Parameters of a surface; those of the edge that meets the rim are values of its slider."""
     p = Program("surface_block", "parameters of a surface; with uplift the half-angle of its footprint")
     v: Symbols = p.read(scene_values.surface_values, "v", active=False)
     slider: Symbols = p.read(scene_values.body_values, "s", active=False)
@@ -131,9 +137,10 @@ def surface_block(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> Pro
 
 
 def top_block(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> Program:
-    """Parameters of the top. With uplift its given springs contain the unilateral contacts, in series (docs/uplift.md).
+    """Parameters of the top.
 
-    The damper loses as much in slow motion as the given one.
+    With uplift the given stiffnesses are those of springs and unilateral contacts in series (docs/uplift.md). The
+    damper then dissipates as much in slow motion as the given one.
     """
     p = Program("top_block", "parameters of the top; with uplift its springs less the compliance of the contacts")
     v: Symbols = p.read(scene_values.top_values, "v", active=False)

@@ -7,13 +7,16 @@ result is named when it is formed. Expressions therefore stay small, and derivat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
 import sympy as sp
 
 Vector = tuple[sp.Expr, sp.Expr, sp.Expr]
+Symbols = dict[str, Any]
+"""Quantity of a block -> its symbol, a `Vector` of symbols, or a constant."""
 AXES = "xyz"
 POLAR, AXIAL = (None, 0, None), (0, None, 0)
 """Constant components of a vector in a planar model, which keeps (E1, E3) of a polar and E2 of an axial one."""
@@ -21,10 +24,10 @@ POLAR, AXIAL = (None, 0, None), (0, None, 0)
 
 @cache
 def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """Partial derivative of an expression. Kept, since models share most of their statements.
+    """Partial derivative of an expression, cached, since models share most of their statements.
 
-    By the rules for sums, products, powers with a number and functions: `sp.diff` first asks what else it could be,
-    which takes most of its time.
+    By the rules for sums, products, powers with a number and functions. `sp.diff` gives the same, but spends most of
+    its time on finding out which kind of expression it is given.
     """
     if expression == symbol:
         return sp.Integer(1)
@@ -110,10 +113,6 @@ class BlockBuilder:
     def build(self) -> Block:
         """The block with the fields added so far."""
         return Block(self.name, tuple(self.fields), self.quantities)
-
-
-Maker = Callable[[str], BlockBuilder]
-"""Begins the block of a given name."""
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """Schedules: which program runs over which bodies and surfaces, from which blocks to which.
 
 A program (`derive.py`) describes one body or one surface. A schedule states, as data, how the programs of a stack
-follow each other in one evaluation. The C that calls them is emitted from it several times (`drivers.py`): for the
-values, for derivatives with respect to the variables of a step, for those by the motion of the ends of a two-port and,
-in models with gradients, for directional derivatives with respect to parameters; each program by its own tangent.
+follow each other in one evaluation. The C that calls them is emitted from it in up to four forms (`drivers.py`): the
+values; derivatives with respect to the variables of a step, by the tangents of the programs; derivatives by the motion
+of the ends of a two-port; and, in models with gradients, derivatives with respect to parameters.
 
 A place is a block in a list of blocks: `body[k-1]` is the block of the body below body k, `rim[j]` that of surface j,
 which lies between bodies j and j+1. `base` and `top` are the indices of the lowest and of the highest body.
@@ -26,7 +26,7 @@ COLUMNS = "MSFP_DOF"
 
 
 class Over(Enum):
-    """What a part of a schedule runs over."""
+    """The bodies or surfaces over which a pass runs."""
 
     BASE = "base"
     BODIES = "moving bodies k"
@@ -82,6 +82,7 @@ class Call:
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     by: Decision | InC | None = None
+    """A decision in C, or C in place of the program; None: the program is called, and so is its tangent."""
     adds: bool = False
     """Whether what it writes is added to a block, which is zero at the start of the part."""
 
@@ -107,7 +108,7 @@ Place = tuple[str, int]
 
 
 class Kept(Enum):
-    """Where C keeps a list, and so in which record its derivatives are."""
+    """The record in which C keeps a list, which decides where its derivatives are."""
 
     PARAMETERS = "p"
     WORK = "w"
@@ -171,9 +172,9 @@ LISTS: Mapping[str, List] = {
     "frame": List("body", "frame"),
     "x": List("coordinates", "x", Kept.WORK, BODIES, tangents=True, directions=True),
     "body": List("body", "body", Kept.WORK, BODIES, tangents=True, directions=True),
-    "load_force": List("vector", "load_force"),
+    "load_force": List("force", "load_force"),
     "load_moment": List("moment", "load_moment"),
-    "force": List("vector", "force", Kept.WORK, BODIES, tangents=True, directions=True),
+    "force": List("force", "force", Kept.WORK, BODIES, tangents=True, directions=True),
     "moment": List("moment", "moment", Kept.WORK, BODIES, tangents=True, directions=True),
     "unknowns": List("unknowns", "unknowns", length=SURFACES),
     "friction": List("friction", "friction", length=SURFACES),
@@ -192,7 +193,7 @@ LISTS: Mapping[str, List] = {
     "local_moment": List("moment", "local_moment", length=SURFACES),
     "unilateral": List("unilateral", "unilateral", Kept.WORK, SURFACES, directions=True),
     "rim_wrench": List("rim_wrench", "rim_wrench", Kept.WORK, SURFACES),
-    "carried": List("vector", "carried", length=BODIES),
+    "carried": List("force", "carried", length=BODIES),
     "excess": List("linear", "excess", length=SURFACES),
     "joint_moment": List("moment", "joint_moment", length=SURFACES),
     "below": List("moment", "below", Kept.WORK, BODIES),
@@ -288,7 +289,7 @@ def _rim(effects: Effects) -> tuple[Call, ...]:
 
 
 STAGE = Call("contact_stage", ("surface_parameters[j]", "before[j]"), ("stage[j]",))
-"""What the stage formula of friction, and of a memory, gives."""
+"""Constants of the stage formula of friction, and of a memory."""
 
 
 def momentum_balances(effects: Effects) -> Schedule:
@@ -328,7 +329,7 @@ def momentum_balances(effects: Effects) -> Schedule:
 
 
 def _uplift(rims: bool) -> tuple[Pass, ...]:
-    """Forces of the surfaces with uplift: of their unilateral contacts and rims, with what is left to balance."""
+    """Forces of the surfaces with uplift, of unilateral contacts and rims, and the residual of the linear balances."""
     slider, wrench = "body[slider]", ("rim_wrench[j]",) if rims else ()
     contact = Decision(
         "msfp_unilateral_force(p, w, j)",
@@ -356,8 +357,10 @@ def _uplift(rims: bool) -> tuple[Pass, ...]:
 
 
 def condensed(effects: Effects) -> Schedule:
-    """The condensed equations: angular balances, with interface forces summed from the top down and contacts in closed
-    form. With uplift the surfaces give the forces, and what these leave of the sums are further rows.
+    """The condensed equations: the angular balances (3.27), (3.29).
+
+    Interface forces (3.26), (3.28) are summed from the top down, and contacts (3.13)-(3.19) are in closed form. With
+    uplift the unilateral contacts give the forces; the differences between these and the sums are further rows.
     """
     rim, uplift = ("rim[j]",) if effects.rims else (), effects.uplift
     law = ("coefficient[j]",) if effects.law is not None else ()
@@ -415,11 +418,6 @@ def condensed(effects: Effects) -> Schedule:
             Pass(Over.BODIES, (Call("angular_balance", balance, ("angular[k]",)),)),
         ),
     }
-
-
-def schedules(effects: Effects) -> tuple[Schedule, Schedule]:
-    """All schedules of a model: the momentum balances and the condensed equations."""
-    return momentum_balances(effects), condensed(effects)
 
 
 def energies(effects: Effects) -> Schedule:

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import sympy as sp
 
 from .blocks import Blocks
 from .body import energy_terms, rate_of_angular_momentum
 from .functions import Select
-from .program import Program, Vector, add, cross, scale
-
-Symbols = dict[str, Any]
+from .program import Program, Symbols, Vector, add, cross, scale
 
 
 def mass_point(p: Program, par: Symbols, body: Symbols) -> tuple[Vector, Vector, Vector]:
@@ -110,7 +106,7 @@ def top_wrench(b: Blocks, rotating_support: bool) -> Program:
     stage: Symbols = p.read(b.foot_stage, "y", active=False)
     body: Symbols = p.read(b.body, "b", active=("t3", "w", "al", "wp", "alp", "C", "V", "A"))
     x: Symbols = p.read(b.coordinates, "x", active=("phi",))
-    force: Symbols = p.read(b.vector, "fe")
+    force: Symbols = p.read(b.force, "fe")
     moment: Symbols = p.read(b.moment, "me")
     zero = sp.Integer(0)
     horizontal: Vector = (

@@ -2,27 +2,24 @@
 
 End A holds the base, end B the far side of the interface, springs and dampers on the top plate (docs/embedding.md).
 Derivatives by the motion of the ends are those of the programs of the schedule with all inputs active but parameters.
-A program turns the rotation of an end into the three angles of a plate.
+`rotation_angles` gives the three angles of a plate from the rotation vector of an end.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any
 
 import sympy as sp
 
 from .blocks import Blocks
 from .functions import ArcTan2, Stumpff
 from .lower import Kernel, Tangent, active_inputs, differentiated, jacobian_column, lower, values_of_tangents
-from .program import ZERO, Block, Program, Statement, Use, add, cross, dot, fields_of, scale, subtract
-
-Symbols = dict[str, Any]
+from .program import ZERO, Block, Program, Statement, Symbols, Use, add, cross, dot, fields_of, scale, subtract
 
 
 def _angle(p: Program, sine: sp.Expr, cosine: sp.Expr) -> sp.Expr:
-    """The angle of a sine and cosine whose squares add up to 1, from which its rate follows."""
+    """The angle of a sine and a cosine; its rate is cosine times rate of sine less sine times rate of cosine."""
     angle = p.let(ArcTan2(sine, cosine))
     p.rates[angle] = p.let(cosine * p.rate(sine) - sine * p.rate(cosine))
     return angle
@@ -67,8 +64,8 @@ FIXED: Mapping[str, tuple[str, ...]] = {
     "far_end": ("a", "rest", "axial"),
     "body": ("vc", "rc"),
 }
-"""Block -> what the motion of the ends does not change, since a step has a given length, or what nothing here reads.
-All else of a block moves: a new field is differentiated unless it is named here."""
+"""Block -> quantities that the motion of the ends does not change, since a step has a given length, or that no program
+here reads. All others of a block are differentiated, also those of a new field."""
 CONTACT = ("M", "dY", "dZ", "mu", "N", "source")
 """Results of `contact` on which anything depends."""
 SUPPORT = frozenset({"psi", "theta", "psi1", "theta1"})
@@ -83,7 +80,7 @@ def interface_load(b: Blocks) -> Program:
     x, y, z = subtract(end["u"], end["a"])
     u, v, w = end["v"]
     force = (par["k"] * x + par["c"] * u, par["k"] * y + par["c"] * v, par["kv"] * z + par["cv"] * w - end["axial"])
-    p.write(b.vector, {"F": force}, tangents=False)
+    p.write(b.force, {"F": force}, tangents=False)
     return p
 
 
@@ -102,7 +99,7 @@ def lower_wrench(b: Blocks) -> Program:
     p = Program("lower_wrench", "wrench that the lower end exerts, about its present position")
     frame: Symbols = p.read(b.body, "e", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
-    force: Symbols = p.read(b.vector, "f", active=False)
+    force: Symbols = p.read(b.force, "f", active=False)
     moment: Symbols = p.read(b.moment, "m", active=False)
     held: Symbols = p.read(b.moment, "h", active=False)
     arm = p.let_vector(subtract(body["C"], frame["C"]), "arm")
@@ -116,7 +113,7 @@ def upper_wrench(b: Blocks) -> Program:
     p = Program("upper_wrench", "wrench that the upper end exerts, about its present position")
     end: Symbols = p.read(b.far_end, "e", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
-    force: Symbols = p.read(b.vector, "f", active=False)
+    force: Symbols = p.read(b.force, "f", active=False)
     moment: Symbols = p.read(b.moment, "m", active=False)
     arm = p.let_vector(subtract(body["C"], add(end["rest"], end["u"])), "arm")
     against = scale(sp.Integer(-1), force["F"])
@@ -129,8 +126,8 @@ def upper_wrench(b: Blocks) -> Program:
 
 
 def programs(b: Blocks) -> list[Program]:
-    """All programs of a two-port but those of `rotation.py`."""
-    return [interface_load(b), locking_moment(b), lower_wrench(b), upper_wrench(b)]
+    """All programs of a two-port."""
+    return [rotation_angles(b), interface_load(b), locking_moment(b), lower_wrench(b), upper_wrench(b)]
 
 
 def _moves(use: Use) -> Use:
@@ -146,7 +143,7 @@ def _moving_of(block: Block) -> list[str]:
 
 
 def moving(blocks: Blocks) -> Iterator[tuple[str, str]]:
-    """What moves with an end before an evaluation, as (list, field) of the schedule."""
+    """The fields that the motion of an end changes before an evaluation, as (list, field) of the schedule."""
     lists = {"x": blocks.coordinates, "frame": blocks.body, "load_moment": blocks.moment, "support": blocks.support}
     lists |= {"lock": blocks.lock, "far_end": blocks.far_end, "foot_stage": blocks.foot_stage, "before": blocks.before}
     for name, block in lists.items():
@@ -154,7 +151,7 @@ def moving(blocks: Blocks) -> Iterator[tuple[str, str]]:
 
 
 def by_ends(program: Program, at_hand: bool) -> Program:
-    """The derivatives of a program by the motion of the ends; at_hand: as of `gradients.differentiated`."""
+    """The derivatives of a program by the motion of the ends; at_hand: as of `lower.differentiated`."""
     results = program.tangents or frozenset(program.results)
     if program.name == "contact":
         assert program.output is not None

@@ -51,7 +51,7 @@ class Hysteresis(NamedTuple):
 
 HYSTERESIS = {
     "report": Hysteresis(
-        "one switch for each axis (2.94)-(2.98)",
+        "one switch for each axis (3.18)",
         lambda yu, zv, step: (step(yu), step(zv)),
     ),
     "isotropic": Hysteresis(

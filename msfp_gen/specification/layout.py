@@ -103,7 +103,7 @@ class Effects:
         bool,
         Choice(
             {
-                True: "sliders are stopped by the rims of the dishes (2.99)-(2.109)",
+                True: "sliders are stopped by the rims of the dishes (3.20)-(3.25)",
                 False: "no rims: the sliding displacement may exceed the capacity",
             }
         ),

@@ -62,7 +62,7 @@ def test_every_test_file_of_a_part_exists() -> None:
     for part in mutants.PARTS.values():
         assert all((ROOT / name).exists() for name in part.tests)
     assert "tests/unit/simulation/test_segment_ends.py" in mutants.near("msfp_gen/results/joining.py")
-    assert mutants.near("generator/seat.py") == ("tests/physics/test_uplift.py",)
+    assert mutants.near("generator/unilateral.py") == ("tests/physics/test_uplift.py",)
     for pattern, tests in mutants.CHOSEN.items():
         assert any(fnmatch(str(file.relative_to(ROOT)), pattern) for file in ROOT.rglob("*.[cp]*")), pattern
         assert all((ROOT / name).exists() for name in tests)

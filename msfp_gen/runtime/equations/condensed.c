@@ -1,5 +1,5 @@
-/* condensed.c: the condensed equations: angular balances with interface forces summed from the top down. How they are
- * evaluated is emitted from generator/schedule.py. */
+/* condensed.c: the condensed equations: angular balances (3.27), (3.29), with interface forces (3.26), (3.28) summed
+ * from the top down. Functions msfp_..._values are in msfp_schedule.h, which is emitted from generator/schedule.py. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("O3") /* unrolls the loops over bodies and surfaces */
 #endif

@@ -1,9 +1,9 @@
-/* contact.c: friction and contact of all surfaces at once, one surface in each lane of a vector.
+/* contact.c: friction and contact (3.13)-(3.19) of all surfaces at once, one surface in each lane of a vector.
  *
- * The friction force over -mu N is g = f + T df/dt, with f = (Y, Z) and the damping time T of the contact. With the
- * stage formula f = fp + beta df/dt it is g = fp + (beta + T) df/dt. For each surface, Newton's method solves this for
- * g, and mu from its law: two or three local unknowns, from which f follows. They are eliminated from the tangent of
- * the moment and of N by their consistent tangent.
+ * The friction force (3.16) over -mu N is g = f + T df/dt, with f = (Y, Z) and the damping time T of the contact. With
+ * the stage formula f = fp + beta df/dt it is g = fp + (beta + T) df/dt. For each surface, Newton's method solves this
+ * for g, and mu from its law: two or three local unknowns, from which f follows. They are eliminated from the tangent
+ * of the moment and of N by their consistent tangent.
  */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("O3") /* unrolls the loops over surfaces */

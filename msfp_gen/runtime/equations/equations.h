@@ -46,7 +46,7 @@ static inline int msfp_unknown_field(int order, int i)
     return msfp_coordinate_field(order, i);
 }
 
-/* The blocks of an evaluation that msfp_work has not (msfp_schedule.h). */
+/* The blocks of an evaluation that are not in msfp_work (msfp_schedule.h). */
 typedef struct msfp_blocks msfp_blocks;
 typedef struct msfp_block_tangents msfp_block_tangents;
 
@@ -59,13 +59,13 @@ static inline int msfp_slider(int j)
     return signs[j] > 0 ? j + 1 : j;
 }
 
-/* What an evaluation is given: coordinates, motion of the base unless it is the same as in `w`, loads, friction and
+/* Inputs of an evaluation: coordinates, motion of the base unless it is the same as in `w`, loads, friction and
  * memories. seed: NULL outside of a step. */
 void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                      msfp_blocks *s);
-/* The inertial frame at r_01 as the block of a body, the parent of body 0. */
+/* The inertial frame at r_01 (3.1) as the block of a body, the parent of body 0. */
 void msfp_inertial_frame(const msfp_point *at, double *body);
-/* Of these what acts on the top plate from outside: load, the block `foot_stage`, axis of a rotating support. */
+/* Inputs at the top plate alone: load, the block `foot_stage`, axis of a rotating support. */
 void msfp_set_loads(const msfp_parameters *p, const msfp_point *at, msfp_blocks *s);
 /* Motion of all bodies alone, into `w`. */
 void msfp_motion(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
@@ -86,6 +86,7 @@ void msfp_support_axis(const msfp_point *at, double *upright);
 
 /* Angles psi, theta, phi (2.1) of a rotation vector, with two derivatives in time: both [order][3]. */
 void msfp_end_angles(const double rotation[3][3], double angles[3][3]);
+
 /* ---- contact_unilateral.c ---- */
 
 /* Compression of the unilateral contact of surface j [m]; negative where it is open. 1 in models without uplift. */
@@ -98,7 +99,7 @@ void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j);
 
 /* ---- surface.c ---- */
 
-/* Rim force of surface j; drim: its Jacobian [force, moment][inputs of the rim], or NULL. */
+/* Rim force (3.22)-(3.25) of surface j; drim: its Jacobian [force, moment][inputs of the rim], or NULL. */
 void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);
 /* Sliding displacements and gaps (3.20), (3.21) [m] at given coordinates. */
 void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE]);
@@ -138,7 +139,7 @@ void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const double *dfo
 
 /* ---- observe.c ---- */
 
-/* What energies and powers are given beside the evaluation: motion of the base, load, axis of a rotating support. */
+/* Inputs of energies and powers that are not in `w`: motion of the base, load, axis of a rotating support. */
 void msfp_set_observed(const msfp_point *at, msfp_blocks *s);
 /* Gap of the rim of surface j and its rate, as the block `closed_rim`. */
 void msfp_gap_of_rim(const msfp_work *w, int j, double *rim);

@@ -1,4 +1,4 @@
-/* kinematics.c: parameters, what an evaluation is given, the foot of the supported mass, named points. */
+/* kinematics.c: parameters, inputs of an evaluation, the foot of the supported mass, named points (3.1)-(3.11). */
 #include <math.h>
 #include <string.h>
 #include "equations.h"
@@ -7,7 +7,7 @@
 
 static const int signs[NB] = MSFP_SIGNS;
 
-/* What the parameters of body k are made of beside its own values. */
+/* Values of the surfaces below and above body k, on which its parameters depend. */
 static void set_sides(msfp_parameters *p, int k)
 {
     double *sides = p->sides[k];

@@ -1,5 +1,5 @@
-/* momentum_balances.c: the 6(n-1) balances of PEER 2017/07 as they stand, their Jacobians, and Newton's method on
- * them. How the balances are evaluated and differentiated is emitted from generator/schedule.py. */
+/* momentum_balances.c: the 6(n-1) balances (3.26)-(3.29) as PEER 2017/07 states them, their Jacobians, and Newton's
+ * method on them. msfp_balances_values and _tangents are in msfp_schedule.h, emitted from generator/schedule.py. */
 #include <math.h>
 #include <string.h>
 #include "equations.h"

@@ -1,4 +1,4 @@
-/* surface.c: rims and gaps of the sliding surfaces. */
+/* surface.c: gaps (3.20), (3.21) and rims (3.22)-(3.25) of the sliding surfaces. */
 #include <math.h>
 #include <string.h>
 #include "equations.h"

@@ -124,7 +124,7 @@ static void heat_flux(const msfp_run *run, const msfp_state *s, double flux[NB])
     }
 }
 
-/* Rise in temperature [K] by the states of heat.c, over a step of the mean flux; exp(-z) is taken as
+/* Rise in temperature [K] by the states of memory.c, over a step of the mean flux; exp(-z) is taken as
  * 1/(1 + z + z^2/2). */
 static finding hot(const msfp_run *run, double h, double heat[NB][MSFP_HEAT_STATES], double flux[NB])
 {

@@ -26,8 +26,9 @@ double msfp_control_order(int method);
 
 /* Base motion, load and rotation of the support at time t [s], into `at`. */
 void msfp_point_at(msfp_run *run, double t, msfp_point *at);
-/* What is integrated of a state, into `at`; then the whole point of a state. */
+/* The integrated quantities of a state, into `at`. */
 void msfp_place(const msfp_state *s, msfp_point *at);
+/* All inputs of an evaluation at a state. */
 void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at);
 /* Weights of the start of the last step, its interpolation nodes and its end in the polynomial through all of them. */
 typedef struct {
@@ -39,7 +40,7 @@ msfp_weights msfp_weights_at(const msfp_run *run, double share);
 void msfp_interpolate(const msfp_run *run, double share, msfp_state *out);
 /* Absolute tolerance of coordinate d of body j + 1: of an angle [rad], or of a separation (d >= 3) [m]. */
 double msfp_absolute_tolerance(const msfp_run *run, int j, int d);
-/* sum += h times the weighted rates of the first `count` states, of what is integrated. */
+/* sum += h times the weighted rates of the integrated quantities of the first `count` states. */
 void msfp_add_rates(msfp_state *sum, const msfp_state *states, const double *weights, int count, double h);
 /* The state of the evaluation in run->work at the point `at`, with Y, Z in `f` and all rates, but for powers and what a
  * stage formula gives: temperatures and works. */
@@ -87,7 +88,7 @@ MSFP_INLINE void msfp_hermite(const double *y0, const double *d0, const double *
     for (int i = 0; i < count; ++i)
         out[i] = w0 * y0[i] + w1 * y1[i] + w * (r * d0[i] - s * d1[i]);
 }
-/* What is integrated, on these cubics. */
+/* The integrated quantities, on these cubics. */
 MSFP_INLINE void msfp_cubics(const double *now, const double *next, double h, double share, int width, double *out)
 {
     msfp_hermite(MSFP_FROM(now, q, width), MSFP_FROM(now, v, width), MSFP_FROM(next, q, width),
@@ -95,7 +96,7 @@ MSFP_INLINE void msfp_cubics(const double *now, const double *next, double h, do
     msfp_hermite(MSFP_FROM(now, v, width), MSFP_FROM(now, a, width), MSFP_FROM(next, v, width),
                  MSFP_FROM(next, a, width), h, share, MSFP_INTEGRATED * width, MSFP_FROM(out, v, width));
 }
-/* Its rates, linear in time. */
+/* Their rates, linear in time. */
 MSFP_INLINE void msfp_linear_rates(const double *now, const double *next, double share, int width, double *out)
 {
     for (int k = 0; k < MSFP_INTEGRATED * width; ++k)

@@ -1,4 +1,4 @@
-"""Unilateral contact of a surface, for models with uplift; names with `seat` refer to it.
+"""Unilateral contact of a surface, for models with uplift; `seat` in names of fields refers to it.
 
 PEER 2017/07 joins the two bodies at the sphere centre by a ball joint (separation delta = 0). With uplift a stiff
 contact that transmits compression only replaces it. With the compression s = -delta, the largest penetration over the
@@ -10,15 +10,12 @@ mentions uplift as a possible extension (chapter 5).
 
 from __future__ import annotations
 
-from typing import Any
-
 import sympy as sp
 
 from .blocks import Blocks
 from .functions import Select, Step
-from .program import Program, Vector, add, combine, cross, dot, scale, subtract
+from .program import Program, Symbols, Vector, add, combine, cross, dot, scale, subtract
 
-Symbols = dict[str, Any]
 CENTRE = sp.Float("1e-60")
 """Added to a squared length [m^2]: where the length is zero, its derivative is zero, and no value changes."""
 
@@ -72,7 +69,7 @@ def _write_force(p: Program, b: Blocks, par: Symbols, depth: sp.Expr, normal: Ve
     return p
 
 
-def seat_depth(b: Blocks) -> Program:
+def unilateral_depth(b: Blocks) -> Program:
     """Penetration, negative where the contact is open, and how far the compression points out of the footprint."""
     p = Program("unilateral_depth", "unilateral contact: penetration, and by how much the footprint is missed")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
@@ -86,7 +83,7 @@ def seat_depth(b: Blocks) -> Program:
     return p
 
 
-def seat_inside(b: Blocks) -> Program:
+def unilateral_inside(b: Blocks) -> Program:
     """Contact whose resultant passes through the footprint: a spring that is equally stiff in every direction."""
     p = Program("unilateral_inside", "unilateral contact: force while the resultant passes through the footprint")
     par, _, s = _read_inputs(p, b)
@@ -94,7 +91,7 @@ def seat_inside(b: Blocks) -> Program:
     return _write_force(p, b, par, depth, p.let_vector(scale(1 / depth, s), "n"), s)
 
 
-def seat_edge(b: Blocks) -> Program:
+def unilateral_edge(b: Blocks) -> Program:
     """Contact at the edge of the footprint: the slider stands on its edge, and the force produces a righting moment."""
     p = Program("unilateral_edge", "unilateral contact: force while the slider stands on the edge of its footprint")
     par, slider, s = _read_inputs(p, b)
@@ -124,7 +121,7 @@ def surface_force(b: Blocks, rims: bool) -> Program:
     if rims:
         rim: Symbols = p.read(b.rim_wrench, "rim", active=("F",))
         force = add(force, rim["F"])
-    p.write(b.vector, {"F": force})
+    p.write(b.force, {"F": force})
     return p
 
 
@@ -156,7 +153,7 @@ def split_moment(b: Blocks, rims: bool) -> Program:
 def wrench_above(b: Blocks) -> Program:
     """Force and moment above the top plate, with which the sums of the bodies below begin."""
     p = Program("wrench_above", "force and moment above the top plate, with which sums from the top down begin")
-    force: Symbols = p.read(b.vector, "f")
+    force: Symbols = p.read(b.force, "f")
     moment: Symbols = p.read(b.moment, "m")
     p.write(b.wrench, {"F": force["F"], "M": moment["M"]})
     return p
@@ -165,13 +162,13 @@ def wrench_above(b: Blocks) -> Program:
 def excess_force(b: Blocks) -> Program:
     """Balance of linear momentum of all bodies above a surface (3.26), (3.28): its residual."""
     p = Program("excess_force", "balance of linear momentum of all bodies above a surface: left side less right side")
-    carried: Symbols = p.read(b.vector, "s")
-    force: Symbols = p.read(b.vector, "f")
+    carried: Symbols = p.read(b.force, "s")
+    force: Symbols = p.read(b.force, "f")
     p.write(b.linear, {"r": subtract(carried["F"], force["F"])})
     return p
 
 
 def programs(b: Blocks, rims: bool) -> list[Program]:
     """The programs of a model with uplift."""
-    contact = [seat_depth(b), seat_inside(b), seat_edge(b), *([rim_to_world(b)] if rims else [])]
+    contact = [unilateral_depth(b), unilateral_inside(b), unilateral_edge(b), *([rim_to_world(b)] if rims else [])]
     return [*contact, surface_force(b, rims), split_moment(b, rims), wrench_above(b), excess_force(b)]
