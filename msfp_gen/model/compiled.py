@@ -29,7 +29,7 @@ class Stack(Protocol):
     """One bearing with its top. Arrays are contiguous float64 in SI units.
 
     Shapes, with b = n - 1 bodies and c coordinates each, 3, or 6 with uplift: q, v, a (b, c); f and friction rates
-    (b, 2); base (3, 6); load (6,); row (row size,), of the fields of `specification.rows`; powers (works,); u unknowns.
+    (b, 2); base (3, 6); load (6,); row (row size,), of the fields of `contract.row`; powers (works,); u unknowns.
 
     state: keywords `memory`, what surfaces remember above its start, such as a rise in temperature [K], of laws with
     it; and `foot`, height of the foot of a mass on a vertical spring and its rate [m], [m/s]; left out: at rest.
@@ -80,7 +80,7 @@ class Stack(Protocol):
         """
 
     def vectors(self, q: Array, v: Array, a: Array, base: Array) -> tuple[Array, Array, Array]:
-        """Named points, rotations and bases (3.1)-(3.12), in shapes as of `evaluation.named_vectors`."""
+        """Named points, rotations and bases (3.1)-(3.12), in shapes as of `named_vectors`."""
 
 
 class AnyRun(Protocol):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,23 +36,6 @@ if TYPE_CHECKING:
     from msfp_gen.scene.top import Top
 
 
-class Equations(Protocol):
-    """The part of `Model` that the adapter uses."""
-
-    effects: Effects
-    layout: Layout
-
-    @property
-    def planar(self) -> bool:
-        """Whether the model is planar."""
-
-    def stack(self, bearing: Bearing, top: Top | None = None, anchor: ArrayLike = (0.0, 0.0)) -> Stack:
-        """See `Model.stack`."""
-
-    def unpack(self, rows: Array) -> dict[str, Array]:
-        """See `Model.unpack`: rows, shape (..., row size), as arrays by name."""
-
-
 class Ode:
     """y' = fun(t, y) with y = (q, v, h) flattened, shape (8(n-1),): angles [rad], rates [rad/s], Y and Z.
 
@@ -61,7 +44,7 @@ class Ode:
     a memory of the surface, a top on a vertical spring, and a planar model with a motion outside the E1-E3 plane.
     """
 
-    def __init__(self, model: Equations, bearing: Bearing, motion: Motion, top: Top) -> None:
+    def __init__(self, model: Model, bearing: Bearing, motion: Motion, top: Top) -> None:
         if model.effects.sliders == "massless":
             raise InputError("as_ode: a massless model is no ordinary differential equation; use sliders = 'inertial'")
         if model.effects.law is not None and model.effects.law.memory is not None:
@@ -361,7 +344,7 @@ class Model:
         return named_vectors(self.layout.n, points, rotations, bases)
 
     def as_ode(self, bearing: Bearing, motion: Motion, top: Top) -> Ode:
-        """The model as y' = fun(t, y) with its Jacobian, for library integrators such as SciPy's; see `ode.Ode`."""
+        """The model as y' = fun(t, y) with its Jacobian, for library integrators such as SciPy's; see `Ode`."""
         return Ode(self, bearing, motion, top)
 
     def _state(

@@ -43,7 +43,7 @@ class Poses:
 
 
 def poses(result: RunData) -> Poses:
-    """The stack of `result` in every row; `resample.at_times` gives a result with rows at other times."""
+    """The stack of `result` in every row; `joining.at_times` gives a result with rows at other times."""
     history, bearing, motion = result.history, result.scene.bearing, result.scene.motion
     base = motion.rotation(np.clip(history.time, 0.0, motion.duration))
     angles = np.concatenate([base[:, None], history.tilt_angles], axis=1)

@@ -1,4 +1,4 @@
-"""What the segments of a run that have ended state: the message of a failure, the extremes of all, versions."""
+"""The end of a run: message of a failure, extremes of all segments, versions, and notes that follow from the rows."""
 
 from __future__ import annotations
 
