@@ -332,12 +332,12 @@ class BearingResult(OneBearing):
 
     @property
     def number(self) -> int:
-        """Its number, from 1."""
+        """Number of the bearing, from 1."""
         return self.index + 1
 
     @property
     def label(self) -> str:
-        """What messages call the bearing: its number, and its name."""
+        """Number and name of the bearing, for messages."""
         return self.scene.label(self.index)
 
     @property
@@ -404,10 +404,10 @@ class BearingResult(OneBearing):
         ]
 
     def derived_and_groups(self) -> tuple[tuple[str, ...], dict[str, xr.Dataset]]:
-        """Its file has only the dataset, for other programs."""
+        """None: the file of one bearing has only the dataset, for other programs."""
         return (), {}
 
     @cached_property
     def dataset(self) -> xr.Dataset:
-        """Its rows as an xarray.Dataset; variables, units and meanings are those of `Result.dataset`."""
+        """The rows of the bearing as an xarray.Dataset; variables, units and meanings are those of `Result.dataset`."""
         return building_dataset.dataset_of_one(self)

@@ -401,7 +401,7 @@ def find_prebuilt(spec: ModelSpec) -> tuple[Path, cache.Manifest] | None:
 
 
 def find_prebuilt_driver(module: str, files: Mapping[str, str]) -> tuple[Path, cache.Manifest] | None:
-    """The same for a module of these files, name -> text, that drives models."""
+    """As `find_prebuilt`, for a module that drives models. files: name -> text."""
     return _find(module, cache.digest_files(files))
 
 

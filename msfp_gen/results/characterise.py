@@ -159,7 +159,7 @@ class Characterisation:
 
     @property
     def title(self) -> str:
-        """What it is of."""
+        """Name of the scene or bearing."""
         return self.name or "unnamed scene"
 
     def rows(self) -> list[tuple[str, str]]:
@@ -358,7 +358,7 @@ def characterise(one: BearingData) -> Characterisation:
 
 
 def _branches(result: RunData, path: ForcePath) -> Callable[[int, int], Branch]:
-    """What gives the sliding regimes from one row to another."""
+    """A function that gives the sliding regimes between two rows."""
     (u, force), (slip, plastic) = path.along, signed_slip(result, path.direction)
 
     def branch(first: int, last: int) -> Branch:
@@ -379,7 +379,7 @@ def characterised(
     demands: Callable[[slice | None], tuple[SurfaceDemand, ...]] = lambda rows: (),
     branch: Callable[[int, int], Branch] | None = None,
 ) -> Characterisation:
-    """What follows from the path of a bearing, or of an isolation system.
+    """Properties that follow from the path of a bearing, or of an isolation system.
 
     name, status: of the run. peaks: largest horizontal displacement [m] and force [N] over all steps. load: that of the
     period [N]; None: none. dissipated: energy since the start, shape (T,) [J]. demands: on the surfaces over some rows;
@@ -442,7 +442,7 @@ REMEDY = "give motion.hold, such as 20 s, for time without motion in which it co
 
 
 def _notes(kind: Kind, path: ForcePath, demands: Sequence[SurfaceDemand], regimes: bool) -> list[str]:
-    """What is not defined in this run, and why. regimes: whether those of sliding are known."""
+    """Which quantities this run does not define, and why. regimes: whether the sliding regimes are known."""
     notes = []
     if kind == "two directions":
         notes.append(

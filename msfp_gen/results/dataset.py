@@ -86,7 +86,7 @@ def dataset_of_bearing(one: BearingData, attributes: dict[str, Attribute]) -> xr
 
 
 def arrays_of(result: BearingData) -> Arrays:
-    """The arrays of which the variables are parts."""
+    """The arrays of a result by field; each variable is one of them or a part of one."""
     return rows_of(result.history) | {
         name: np.array([getattr(event, name.removeprefix("event_")) for event in result.events], variable.kind).reshape(
             len(result.events), *(len(LABELS[dim]) for dim in variable.dims[1:])
@@ -97,7 +97,7 @@ def arrays_of(result: BearingData) -> Arrays:
 
 
 def rows_of(history: BearingRows) -> Arrays:
-    """Those of the rows."""
+    """The arrays of the rows, by field."""
     return history.arrays() | {f"energy_{name}": values for name, values in history.energy.items()}
 
 

@@ -25,7 +25,7 @@ from msfp_gen.common.output import DATASET_SUFFIXES, check_output, replacing, wr
 from msfp_gen.common.tables import TABLE_SUFFIXES, parquet_bytes
 from msfp_gen.motions.motion import Motion
 from msfp_gen.results.note import Note
-from msfp_gen.results.sign import DEFAULT, VARIABLES, sign_of
+from msfp_gen.results.sign import DEFAULT, SIGNED, sign_of
 from msfp_gen.results.stored_group import ArrayDigest, Attribute, StoredGroup, digest, seal, stored_groups
 from msfp_gen.results.variables import Arrays, Places, columns_of
 
@@ -115,7 +115,7 @@ class ResultFiles:
 
     @property
     def title(self) -> str:
-        """What the result is of, for the head of a table."""
+        """Name of the scene, as the head of a table."""
         return self.scene.name or "unnamed scene"
 
     @property
@@ -320,7 +320,7 @@ def signed(dataset: xr.Dataset, word: str) -> xr.Dataset:
         return dataset
     if "displacement" not in dataset:
         raise InputError(f"sign = {word!r}: columns of a building have one sign, base - top; leave it out")
-    changed = [name for base in VARIABLES for name in (base, f"event_{base}") if name in dataset]
+    changed = [name for base in SIGNED for name in (base, f"event_{base}") if name in dataset]
     return dataset.assign({name: dataset[name].copy(data=factor * dataset[name] + 0.0) for name in changed})  # no -0.0
 
 

@@ -145,7 +145,7 @@ def thinned(count: int, rows: Reader) -> History:
 
 
 def thinned_history(history: History) -> History:
-    """The same of rows that are in memory."""
+    """`thinned` for rows that are in memory."""
     if len(history.time) <= 2 * GROUPS:
         return history
     return thinned(len(history.time), lambda start, end: taken(history, slice(start, end)))

@@ -50,8 +50,8 @@ class Loop:
 class ForcePath(NamedTuple):
     """A horizontal motion and its force, at T times.
 
-    time: shape (T,) [s]. u, force: shape (T, 2) [m], [N]. direction: unit vector of the largest displacement. row: of
-    it. peak: it [m]. what: moves.
+    time: shape (T,) [s]. u, force: shape (T, 2) [m], [N]. direction: unit vector of the largest displacement. row: its
+    row. peak: its size [m]. what: the moving part, in messages.
     """
 
     time: Array

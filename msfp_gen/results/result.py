@@ -41,7 +41,7 @@ Rows = list[tuple[str, str]]  # label and value
 
 
 class Curve(NamedTuple):
-    """A curve in few lines of HTML: points x, y, ndarrays, shape (k,), [unit of the caption], and what they are."""
+    """A curve for a notebook: points x, y, ndarrays, shape (k,), [units of the caption], and a caption."""
 
     x: Array
     y: Array
@@ -75,14 +75,14 @@ class AnyResult(ResultFiles, ABC):
     @property
     @abstractmethod
     def bearings(self) -> Sequence[OneBearing]:
-        """The results of its bearings."""
+        """The results of the bearings of the run."""
 
     @abstractmethod
     def part_tables(self) -> list[Table]:
-        """Tables of its parts."""
+        """Tables of the surfaces of a bearing, or of the parts of a building."""
 
     def work_rows(self) -> Rows:
-        """Label and value of its energies and of the work of the solver."""
+        """Label and value of the energies of the run and of the work of the solver."""
         return []
 
     def tables(self) -> list[Table]:
@@ -106,7 +106,7 @@ class AnyResult(ResultFiles, ABC):
         return [("status", self.status_text), ("verdict", self.verdict.text), *self.main_results()]
 
     def printed_rows(self) -> Rows:
-        """These rows with the first notes."""
+        """`stated_rows` with the first notes."""
         lines, others = self.first_notes
         more = f"; {others} more in .notes" if others else ""
         shown = [("notes", "; ".join(lines) + more)] if lines else []
@@ -141,11 +141,11 @@ class OneBearing(AnyResult, BearingData):
 
     @property
     def bearings(self) -> tuple[OneBearing]:
-        """Itself."""
+        """The bearing itself."""
         return (self,)
 
     def main_results(self) -> Rows:
-        """Label and value of its peaks."""
+        """Label and value of the peaks of the bearing."""
         return rows_of_bearing(self.summary)
 
     @property
@@ -190,7 +190,7 @@ class Result(OneBearing, RunData):
         return [time_row(self.summary), *super().main_results()]
 
     def work_rows(self) -> Rows:
-        """Label and value of its energy and of the work of the solver."""
+        """Label and value of the energy of the run and of the work of the solver."""
         return work_rows(self.summary)
 
     @cached_property

@@ -98,27 +98,27 @@ def _slopes(name: str, gradients: Gradients, history: History) -> Array:
 
 
 class BearingData(ResultFiles):
-    """What the run of any bearing has, alone or below a building."""
+    """Data of the run of any bearing, alone or below a building."""
 
     @property
     def number(self) -> int:
-        """Below a building, from 1; 0: alone."""
+        """Number of the bearing below a building, from 1; 0: the bearing is alone."""
         return 0
 
     @property
     def label(self) -> str:
-        """What messages call it below a building; "": alone."""
+        """Name of the bearing in messages below a building; "" for a bearing alone."""
         return ""
 
     if TYPE_CHECKING:  # fields of the subclasses, or properties
 
         @property
         def bearing(self) -> Bearing:
-            """Its values."""
+            """The bearing that was run."""
 
         @property
         def effects(self) -> Effects:
-            """Those of its model at the start."""
+            """Effects of the model at the start."""
 
         @property
         def axial_load(self) -> float | None:
@@ -126,15 +126,15 @@ class BearingData(ResultFiles):
 
         @property
         def history(self) -> BearingRows:
-            """Its rows."""
+            """Rows of the run."""
 
         @property
         def events(self) -> tuple[Event, ...]:
-            """In order of time; none below a building, which does not record them."""
+            """Events in order of time; none below a building, which does not record them."""
 
         @property
         def extremes(self) -> Extremes:
-            """Over all steps."""
+            """Extremes over all steps."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 from msfp_gen.common.errors import InputError
 
-VARIABLES = ("displacement", "top_force", "top_moment")  # that change their sign
+SIGNED = ("displacement", "top_force", "top_moment")  # variables that change their sign
 
 
 class Sign(NamedTuple):
-    """factor: on the values of a result. difference: what u is. force: whose force F is."""
+    """factor: of the values of a result. difference: definition of u. force: body on which F acts."""
 
     factor: float
     difference: str

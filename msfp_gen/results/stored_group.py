@@ -139,7 +139,7 @@ def stored_groups(path: Path) -> Iterator[StoredGroup]:
 
 
 def seal(total: hashlib._Hash) -> bytes:
-    """What follows the bytes of a file: a mark, and their sha256, of which this is the state.
+    """The end of a sealed file: a mark, and the sha256 of all bytes before it. total: state of that sha256.
 
     HDF5 does not read behind its own end, and cuts the seal off where it writes: a file that another program has
     changed has none, and its digest tells whether a value is another one.
@@ -182,7 +182,7 @@ class ArrayDigest:
 
     @classmethod
     def of(cls, values: Any) -> ArrayDigest:
-        """That of a whole array."""
+        """The digest of a whole array."""
         layout = cls()
         layout.add(values)
         return layout

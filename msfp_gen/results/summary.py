@@ -204,7 +204,7 @@ def uplift_of(one: BearingData) -> dict[str, Any]:
 
 
 def rows_of_bearing(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Label and value of these peaks."""
+    """Label and value of the peaks in the summary of a bearing."""
     ratio = "" if summary["peak_force_ratio"] is None else f" ({summary['peak_force_ratio']:.3f} of the axial load)"
     least, most = min(summary["minimum_normal_force"]), max(summary["maximum_normal_force"])
     return [

@@ -51,12 +51,12 @@ class Variable(NamedTuple):
 
     @property
     def about(self) -> dict[str, str]:
-        """Its attributes."""
+        """Attributes of the variable in a dataset."""
         about = {"units": self.unit, "long_name": self.meaning, "sign": self.sign}
         return {name: text for name, text in about.items() if text}
 
     def of(self, arrays: Mapping[str, Any]) -> Array:
-        """Its values, of the shape of its dimensions [its unit]. arrays: of a result, by field."""
+        """Values of the variable, of the shape of `dims` [unit of the variable]. arrays: of a result, by field."""
         values: Array = arrays[self.field][self.part or ...]
         return values
 

@@ -189,7 +189,7 @@ def _by_surface(one: BearingData, rows: Array, reached: Array, allowed: Array | 
 
 
 def _rim_force(one: BearingData, limits: Limits) -> Iterator[Value]:
-    """By the rows, and by the spring of the rim at its largest compression over all steps."""
+    """The larger of the force in the rows and that of the rim spring at its largest compression over all steps."""
     bearing = one.bearing.arrays()
     rows, reached = one.history.rim_force, np.asarray(one.extremes.rim_force)
     if not any(note.kind == "rims" and not note.action for note in one.notes):
@@ -228,7 +228,7 @@ def _uplift_duration(one: BearingData, limits: Limits) -> Iterator[Value]:
 
 
 def _temperature(one: BearingData, limits: Limits) -> Iterator[Value]:
-    """Of the friction law, or of the monitor of heat where the law has none."""
+    """Temperatures of the friction law, or of the monitor of heat where the law has none."""
     reached, rows = one.extremes.temperature, one.history.temperature
     if reached is not None and rows is not None:
         yield from _by_surface(one, rows, reached, limits.temperature)
@@ -266,7 +266,7 @@ def _radius(bearing: Bearing, surface: int) -> float:
 
 
 def _face(one: BearingData, limits: Limits) -> Iterator[Value]:
-    """As recorded of a bearing of a building, or as the note of a bearing alone states it."""
+    """Distances as a bearing of a building records them, or as the note of a bearing alone states them."""
     offsets, times = one.extremes.contact_offset, one.extremes.contact_time
     if offsets is None or times is None:
         yield from _noted("footprint", _radius)(one, limits)

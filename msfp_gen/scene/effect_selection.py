@@ -57,7 +57,7 @@ LARGEST_TILT = 0.5  # sliding capacity over radius; beyond it a slider tilts by 
 
 
 def scene_doubts(scene: SceneFields) -> Iterator[tuple[int, float, str]]:
-    """Those of the bearing of a scene, and of what holds its top plate up."""
+    """Doubts about values of the bearing of a scene, and about the springs that hold its top plate up."""
     yield from doubtful_values(scene.bearing)
     if standing := standing_of(scene):
         yield from unsteady(*standing[:3])
@@ -73,8 +73,8 @@ def scene_doubts(scene: SceneFields) -> Iterator[tuple[int, float, str]]:
 def ringing(path: str, damping: float, what: str, turn: float, ratio: float, cure: float) -> str:
     """The text of a doubt about a vibration that rings on.
 
-    path: of the damping in messages. damping: its value. what: vibrates, at the circular frequency `turn` [rad/s] with
-    the damping ratio `ratio`. cure: damping with which it has `USUAL_DAMPING`.
+    path: of the damping in messages. damping: its value [N s/m]. what: the part that vibrates. turn: its circular
+    frequency [rad/s]. ratio: its damping ratio [-]. cure: damping with which it has `USUAL_DAMPING` [N s/m].
     """
     return (
         f"{path} = {damping:g}: {what} at {turn / (2 * np.pi):.3g} Hz with {ratio:.1%} of critical damping and rings "

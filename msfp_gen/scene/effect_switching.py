@@ -40,19 +40,19 @@ MONITORS = ("rims", "uplift", "inertia", "heat")
 
 
 class Requested(Protocol):
-    """What a user asks of the run of a bearing: its scene, or its part in a building."""
+    """The input that decides the effects of a run: a scene, or the part of a bearing in the scene of a building."""
 
     @property
     def effects(self) -> Effects | Auto:
-        """Given, or selected."""
+        """The effects that are given, or `Auto`."""
 
     @property
     def solver(self) -> Solver:
-        """Of the run."""
+        """Options of the solver."""
 
     @property
     def end(self) -> float:
-        """Of the run [s]."""
+        """End of the run [s]."""
 
 
 class Ending(NamedTuple):

@@ -112,7 +112,7 @@ class Backbone:
 
     @classmethod
     def of(cls, bearing: Bearing, load: float = 0.0) -> Backbone:
-        """That of a bearing, with rims and friction at the radii of its surfaces."""
+        """The backbone of a bearing, with rims and friction at the radii of its surfaces."""
         links = tuple(series_links(bearing, rims=True, arms=True))
         first = min(link.friction for link in links)
         elastic = [

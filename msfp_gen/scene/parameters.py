@@ -69,7 +69,7 @@ REMEDY = (
 
 
 class _Place(NamedTuple):
-    """Where a path leads: the part, the field, its indices with None for all, and how many there are of each."""
+    """The place that a path names: part, field, indices with None for all, and how many there are of each."""
 
     part: str
     field: str

@@ -86,12 +86,12 @@ class Scene(SceneFields):
 
     @property
     def specs(self) -> tuple[ModelSpec, ...]:
-        """The same, as of a building."""
+        """`spec` as a tuple, as a scene of a building has it."""
         return (self.spec,)
 
     @property
     def every_bearing(self) -> tuple[Bearing, ...]:
-        """Its bearing, as of a building."""
+        """The bearing as a tuple, as a scene of a building has it."""
         return (self.bearing,)
 
     @property

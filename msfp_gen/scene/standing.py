@@ -1,4 +1,4 @@
-"""Springs of the top: whether the plate stands, and what of them is the compliance of unilateral contacts.
+"""Springs of the top: whether they hold the plate up, and how much of their compliance is that of the contacts.
 
 The plate stands by its rotational stiffness against load times lever. While all surfaces slide, friction is a force and
 no stiffness. To small tilts the stack is then a chain of links between the sphere centres of its surfaces: body k turns
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene_fields import SceneFields
     from msfp_gen.scene.top import Top
 
-MARGIN = 2.0  # of the stiffness over what the load at rest needs, below which there is a note
+MARGIN = 2.0  # stiffness over that which the load at rest needs; below it there is a note
 
 
 def links(bearing: Bearing) -> Array:
@@ -75,7 +75,7 @@ def check_standing(path: str, stiffness: float, needed: float, load: float) -> N
 
 
 def unsteady(path: str, stiffness: float, needed: float) -> Iterator[tuple[int, float, str]]:
-    """The doubt where a plate stands while friction holds it alone, or would turn over under `MARGIN` times its load.
+    """The doubt about a plate that only friction holds up, or that would turn over under `MARGIN` times its load.
 
     Yields 0 (no surface), the value and the text, as `doubtful_values`. Arguments as of `check_standing`.
     """

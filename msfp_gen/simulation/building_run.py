@@ -67,7 +67,7 @@ KEPT = (*OF_SURFACES, "kinetic", "potential", "rim_stored", "seat_stored", "work
 
 
 class Asked(NamedTuple):
-    """What is asked of a bearing: see `effect_switching.Requested`."""
+    """The input that decides the effects of a bearing: see `effect_switching.Requested`."""
 
     effects: Effects | Auto
     solver: Solver
@@ -78,8 +78,8 @@ class Asked(NamedTuple):
 class Member:
     """A bearing in a run.
 
-    asked: of its effects. effects: of its model. rest: the scene of the bearing at rest between its ends. port: that
-    the run steps.
+    asked: input that decides its effects. effects: of its model. rest: the scene of the bearing at rest between its
+    ends. port: the two-port that the run steps.
     """
 
     asked: Asked
@@ -122,7 +122,7 @@ class Member:
 
     @property
     def faces(self) -> list[int]:
-        """Where the contacts are in the row of its model, as MSFP_FACES of msfp_building.h; not checked with uplift."""
+        """Places of the contacts in the row of its model, as MSFP_FACES of msfp_building.h; not checked with uplift."""
         layout, indices = self.rest.bearing.layout, self._indices
         places = [int(indices[name].flat[0]) for name in ("normal", "angles", "q")]
         return [not self.effects.uplift, layout.surfaces, layout.m, *places, indices["q"].shape[1]]
@@ -199,7 +199,7 @@ class BuildingRun:
 
     @property
     def status(self) -> tuple[str, int, int, float]:
-        """As of `Run`."""
+        """Status as of `Run`."""
         return self.run.status
 
     @property

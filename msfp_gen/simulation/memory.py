@@ -118,7 +118,7 @@ def _of_machine() -> float:
 
 
 def _of_group() -> float:
-    """What the limit of a container leaves, in version 2 or 1 of control groups; cached files count as free."""
+    """Memory that the limit of a container leaves [bytes], by control groups 2 or 1; cached files count as free."""
     for folder, limit, usage, cached in (
         (_CGROUP, "memory.max", "memory.current", "inactive_file"),
         (_CGROUP / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),

@@ -229,7 +229,7 @@ def start_run(
 
 
 def run_arguments(scene: Scene, spec: ModelSpec) -> tuple[dict[str, Any], float]:
-    """What the compiled run of a scene would be given, and the azimuth of its frame [rad]; nothing is compiled."""
+    """The arguments of the compiled run of a scene, and the azimuth of its frame [rad]; nothing is compiled."""
     arguments: dict[str, Any] = {}
 
     def stack(*values: Any) -> tuple[Any, ...]:
