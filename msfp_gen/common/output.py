@@ -76,7 +76,10 @@ def write_text(path: Path, text: str) -> None:
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
-def clear_leftovers(path: Path, age: float = 3600.0) -> None:
+OLD = 3600.0  # age from which no process is still writing a temporary file [s]
+
+
+def clear_leftovers(path: Path, age: float = OLD) -> None:
     """Delete temporary files of `path` that were last modified at least `age` [s] ago.
 
     Younger ones may belong to a process that is still writing.
@@ -84,9 +87,9 @@ def clear_leftovers(path: Path, age: float = 3600.0) -> None:
     _clear(path.parent, escape(path.stem), path.suffix, age)
 
 
-def clear_all_leftovers(folder: Path, suffix: str, age: float = 3600.0) -> None:
+def clear_all_leftovers(folder: Path, suffix: str) -> None:
     """Delete the temporary files, as of `clear_leftovers`, of all files in `folder` that end in `suffix`."""
-    _clear(folder, "*", suffix, age)
+    _clear(folder, "*", suffix, OLD)
 
 
 def _clear(folder: Path, stem: str, suffix: str, age: float) -> None:

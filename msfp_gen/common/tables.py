@@ -100,10 +100,10 @@ def write_columns(path: str | Path, columns: Mapping[tuple[str, str], Sequence[A
     return target
 
 
-def write_rows(path: str | Path, rows: Sequence[Mapping[str, Any]], name: str = "output") -> Path:
+def write_rows(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     """Write rows of names and values as `write_columns` does, without units; a row may lack values."""
     names = dict.fromkeys(key for row in rows for key in row)
-    return write_columns(path, {(key, ""): [row.get(key) for row in rows] for key in names}, name)
+    return write_columns(path, {(key, ""): [row.get(key) for row in rows] for key in names})
 
 
 def _csv(columns: Mapping[tuple[str, str], Sequence[Any]]) -> bytes:

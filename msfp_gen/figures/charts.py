@@ -218,7 +218,7 @@ def plot_work_precision(
         for axes, cost in zip(grid[-1], costs, strict=True):
             axes.set_xlabel(COSTS[cost])
             _whole_decades(axes, [column[cost] for column in columns.values() if cost in column])
-        _legend(figure, grid[0, 0], columns)
+        _legend(figure, columns)
     return figure
 
 
@@ -320,7 +320,7 @@ def _line_style(index: int) -> dict[str, Any]:
     }
 
 
-def _legend(figure: Figure, axes: Axes, columns: Mapping[str, Mapping[str, Array]]) -> None:
+def _legend(figure: Figure, columns: Mapping[str, Mapping[str, Array]]) -> None:
     """One legend for the figure: all methods, and the flags that occur."""
     from matplotlib.lines import Line2D
 

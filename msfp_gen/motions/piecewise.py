@@ -51,16 +51,14 @@ def powers(values: ArrayLike, count: int = ORDER) -> Array:
     return result
 
 
-def derivatives(local: float, orders: int = 3) -> Array:
-    """Matrix that gives value and derivatives of one piece from its coefficients: ndarray, shape (orders, 6).
+def derivatives(local: float) -> Array:
+    """Matrix that gives value and two derivatives of one piece from its coefficients: ndarray, shape (3, 6).
 
-    Args:
-        local: time since the knot at which the piece begins [s].
-        orders: number of rows: the value and orders - 1 derivatives.
+    local: time since the knot at which the piece begins [s].
     """
     rising = powers(local)
-    rows = np.zeros((orders, ORDER))
-    for order in range(orders):
+    rows = np.zeros((3, ORDER))
+    for order in range(3):
         rows[order, order:] = _DERIVATIVE_FACTORS[order, order:] * rising[: ORDER - order]
     return rows
 

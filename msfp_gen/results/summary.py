@@ -65,20 +65,20 @@ def transitions(result: BearingData) -> dict[str, float | None]:
     return values
 
 
-def stopping_displacement(history: BearingRows, surface: int, window: float = WINDOW) -> float | None:
+def stopping_displacement(history: BearingRows, surface: int) -> float | None:
     """Displacement [m] at which `surface` (1..n-1) stops sliding; None if it never slides or never stops.
 
-    It stops where its share of all sliding, taken over a centred `window` of displacement [m], falls below `SHARE` and
+    It stops where its share of all sliding, taken over a centred `WINDOW` of displacement, falls below `SHARE` and
     stays below over one more window, so that a short vibration does not count.
     """
     along, _ = history.path
     rows = np.flatnonzero(np.diff(np.maximum.accumulate(along), prepend=-1.0) > 0)  # new maxima: strictly increasing
     u, sliding = along[rows], history.sliding[rows]
-    if len(u) < 2 or u[-1] - u[0] <= window:
+    if len(u) < 2 or u[-1] - u[0] <= WINDOW:
         return None
     per_window = 20
-    centres = np.arange(u[0] + window / 2, u[-1] - window / 2, window / per_window)
-    ends = (np.column_stack([np.interp(centres + half, u, s) for s in sliding.T]) for half in (-window / 2, window / 2))
+    centres = np.arange(u[0] + WINDOW / 2, u[-1] - WINDOW / 2, WINDOW / per_window)
+    ends = (np.column_stack([np.interp(centres + half, u, s) for s in sliding.T]) for half in (-WINDOW / 2, WINDOW / 2))
     below = slip_shares(np.abs(np.subtract(*ends)))[:, surface - 1] - SHARE
     slides = np.cumsum(below >= 0) > 0
     stays = np.array([(below[i : i + per_window] < 0).all() for i in range(len(below))])

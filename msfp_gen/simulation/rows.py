@@ -46,7 +46,7 @@ def finite_rows(rows: Array) -> Array:
     return rows if finite.all() else rows[: int(finite.argmin())]
 
 
-def history_of(model: Model, rows: Array, azimuth: float, sprung: bool = False, first: Array | None = None) -> History:
+def history_of(model: Model, rows: Array, azimuth: float, sprung: bool, first: Array | None = None) -> History:
     """Rows of a segment in the frame of the user.
 
     rows: of `finite_rows`, one or more. azimuth: of the frame of the model [rad]. sprung: whether the top has a
@@ -111,7 +111,7 @@ def unpacked(model: Model, rows: Array, azimuth: float, sprung: bool, first: Arr
     }
 
 
-def events_of(model: Model, run: Run, azimuth: float) -> tuple[Event, ...]:
+def events_of(run: Run, azimuth: float) -> tuple[Event, ...]:
     """The events of a segment in the frame of the user."""
     return tuple(
         Event(

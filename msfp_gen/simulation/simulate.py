@@ -397,7 +397,7 @@ def _result(sequence: RunSequence, history: History) -> Result:
     scene, segments, parameters, last = sequence.scene, sequence.segments, sequence.parameters, sequence.segments[-1]
     counts = [{k: int(n) for k, n in segment.run.counts.items()} for segment in segments]
     total = Counters(**{name: sum(count[name] for count in counts) for name in counts[0]})
-    events = tuple(event for s in segments for event in events_of(s.model, s.run, s.azimuth))
+    events = tuple(event for s in segments for event in events_of(s.run, s.azimuth))
     return Result(
         scene=scene,
         history=history,

@@ -305,12 +305,12 @@ class _Search:
             estimate = self.attempt(index).estimate
             if estimate is not None and estimate <= self.target:
                 return index
-            self._check_model_error(index, first, *pair)
+            self._check_model_error(index, first, pair[0])
             if sum(not reference.finished for reference in self.references.values()) > REFERENCE_OFFSET:
                 break
         raise RunError(self._target_missed(), status="accuracy")
 
-    def _check_model_error(self, index: int, first: int, trial: Trial, reference: Trial) -> None:
+    def _check_model_error(self, index: int, first: int, trial: Trial) -> None:
         """Raise _ModelErrorTooLargeError if the selected effects keep a run from its end, or from the target.
 
         The latter is so if two tighter tolerances did not reduce the error.

@@ -400,7 +400,7 @@ def optimal_runs(
     return np.asarray(ratios * seconds / float(np.sum(ratios * costs)))
 
 
-def factor_for(weights: Array, wanted: float, least: float = 0.0) -> float:
+def factor_for(weights: Array, wanted: float, least: float) -> float:
     """The factor with which chances in proportion to weights choose as many draws as wanted on average.
 
     Chances are at most 1. least: what is added to each of them.
