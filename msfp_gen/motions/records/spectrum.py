@@ -22,6 +22,7 @@ MEASURES = (*COMPONENTS, "geomean", "rotd50", "rotd100")
 DAMPING = 0.05
 Progress = Callable[[float, float], None]
 _RESOLUTION = 50  # points in a period: the largest value at them is less than 1 - cos(pi/50) = 0.2 % below the peak
+ROUNDING = 1e-9  # of the number of sample intervals in a motion
 _ANGLES = np.radians(np.arange(180.0))  # directions of RotDnn, Boore (2010)
 
 
@@ -123,9 +124,9 @@ def _sampled(source: Record | Corrected | ContinuousMotion) -> tuple[float, Arra
     """Time step [s] and acceleration, ndarray, shape (k, 3), [m/s^2]."""
     if not isinstance(source, (Record, Corrected)):
         # The longest step of a motion is two sample intervals; one without samples has few pieces.
-        points = 2 + int(source.duration / ((source.max_step or source.duration / 1000) / 2))
-        time = np.linspace(0, source.duration, points)
-        return float(time[1]), source.acceleration(time)
+        step = (source.max_step or source.duration / 1000) / 2
+        count = int(np.ceil(source.duration / step * (1 - ROUNDING)))
+        return step, source.acceleration(np.minimum(step * np.arange(count + 1), source.duration))
     values = source.acceleration
     offset = values.mean(axis=0) if isinstance(source, Record) else 0.0
     return float(source.time[1] - source.time[0]), values - offset
