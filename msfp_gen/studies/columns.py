@@ -317,11 +317,14 @@ def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[s
     plain = _EXTREME.sub(symbol, text)
     numbers = [key for key in keep.known if key not in TEXTS]
     try:
-        return formula.parse(plain, [*numbers, *keep.axes, *extremes]), extremes
+        tree = formula.parse(plain, [*numbers, *keep.axes, *extremes])
     except ValueError as error:
         word, named, _ = str(error).partition(" is no name of a law")
         why = f"{word} is no quantity and no axis that holds numbers; see docs/studies.md" if named else str(error)
         raise InputError(f"quantities.{name} = {text!r}: {why}") from None
+    if both := [word for word in sorted(formula.names_in(tree)) if word in keep.axes and word in numbers]:
+        raise InputError(f"quantities.{name} = {text!r}: {both[0]} is a quantity and an axis; rename the axis")
+    return tree, extremes
 
 
 def _finite(value: Any) -> float | None:

@@ -49,6 +49,7 @@ MOST_RUNS = 100_000_000
 TRIED = 1000  # numbers of one axis that are tried before the first run, at least; of texts and tables all
 PARTS = 64  # that a small study has at least, unless these would have fewer than LEAST runs
 LEAST, MOST = 8, 256  # runs of a chunk where the study file does not say
+OF_RECORDS = ("record", "scale")  # its axes, whether there are scales or not
 RECORD_KEYS = ("suite", "motions", "scales", "intensity")
 NOUN = "a table with motions or the file of a suite, and scales"
 COMPONENTS = ("E1", "E2", "E3", "geomean", "rotd50", "rotd100")
@@ -425,8 +426,8 @@ def _checked(table: Mapping[str, Any], folder: Path | None, progress: Progress |
     of_records, tables, intensities, record_table = _records(table.get("records"), folder, progress)
     own = [axis_from(name, axis, folder) for name, axis in _table(table, "axes").items()]
     axes = (*of_records, *own)
-    if len({axis.name for axis in axes}) < len(axes):
-        raise InputError("axes: [records] makes the axes record and scale; give other names")
+    if of_records and (taken := [axis.name for axis in own if axis.name in OF_RECORDS]):
+        raise InputError(f"axes.{taken[0]}: [records] makes the axes {' and '.join(OF_RECORDS)}; give another name")
     sampling = _sampling(table, axes)
     formulas = tuple(_table(table, "quantities").items())
     for name, text in formulas:

@@ -121,6 +121,24 @@ def test_the_intensity_measure_is_that_of_the_spectrum(tmp_path: Any) -> None:
         load_study({**table, "records": {**records, "intensity": {"component": "rotd10"}}})
 
 
+@pytest.mark.parametrize("name", ["record", "scale"])
+def test_an_axis_beside_records_has_no_name_of_theirs(name: str) -> None:
+    """Without `scales` too: an axis `scale` that changes something else would multiply the intensity."""
+    records = {"motions": [{"bundled": "ridgecrest-2019-ci-clc", "duration": 30.0}], "intensity": {"period": 1.0}}
+    axes = {name: {"multiplies": "bearing.friction", "values": [0.5, 1.0]}}
+    with pytest.raises(InputError, match=rf"axes.{name}: \[records\] makes the axes record and scale"):
+        load_study({"scene": "ridgecrest-ccc", "records": records, "axes": axes})
+
+
+def test_a_name_in_a_formula_is_that_of_an_axis_or_of_a_quantity() -> None:
+    """Where it was both, the formula took the axis: here the factor on the load for the force."""
+    axes = {"peak_force": {"multiplies": "top.axial_load", "values": [0.5, 1.0]}}
+    study = {"scene": "fenz-test1", "axes": axes, "keep": ["peak_displacement"]}
+    assert load_study(study).runs == 2
+    with pytest.raises(InputError, match=r"quantities.x = '2 \* peak_force': peak_force is a quantity and an axis"):
+        load_study({**study, "quantities": {"x": "2 * peak_force"}})
+
+
 def test_factors_are_an_axis_of_bounds() -> None:
     study = load_study({"scene": "fenz-test1", "axes": {"bounds": {"factors": "asce7"}}})
     base, found = load_scene("fenz-test1").bearing, [study.scene(run).bearing for run in (1, 2, 3)]
