@@ -284,6 +284,15 @@ def rigid_building(building: Building) -> Building:
     return Building(motions.T @ building.mass @ motions, none, none, nodes)
 
 
+def check_one_ground(scene: BuildingScene, word: str) -> None:
+    """Raise InputError where the ground moves differently below some bearings, for a model that has one motion."""
+    if len(set(scene.grounds[1])) > 1:
+        raise InputError(
+            f"fidelity = {word!r}: it has one motion of the ground, and bearings have motions of their own; give "
+            "another model, such as 'rigid'"
+        )
+
+
 def load_shares(scene: BuildingScene) -> list[float]:
     """The share of the weight that each bearing carries at rest."""
     shares: list[float] = (scene.axial_loads / scene.axial_loads.sum()).tolist()
@@ -291,6 +300,7 @@ def load_shares(scene: BuildingScene) -> list[float]:
 
 
 def _equivalent(scene: BuildingScene) -> Scene:
+    check_one_ground(scene, "equivalent")
     bearing = equivalent_pendulum(scene.every_bearing, load_shares(scene))
     mass = float(scene.axial_loads.sum()) / scene.gravity
     springs = [
@@ -303,8 +313,8 @@ def _equivalent(scene: BuildingScene) -> Scene:
     )  # fmt: skip
     effects = Effects(dimension="spatial", sliders="massless", bouc_wen=scene.modelled[0].bouc_wen)
     return Scene(
-        bearing=bearing, motion=scene.motion, top=top, effects=effects, solver=implicit_solver(scene.solver),
-        duration=scene.duration, output_step=scene.output_step, name=scene.name, fidelity="equivalent",
+        bearing=bearing, motion=scene.first_ground, top=top, effects=effects, solver=implicit_solver(scene.solver),
+        duration=scene.end, output_step=scene.output_step, name=scene.name, limits=scene.limits, fidelity="equivalent",
     )  # fmt: skip
 
 

@@ -186,6 +186,7 @@ class Backbone:
 
 
 _Scene = TypeVar("_Scene")  # of a bearing or of a building
+EQUAL = 1e-9  # relative difference of slopes that are equal but for rounding
 LOOSE = 1e-2  # relative tolerance of the cheaper models
 JOINT = 0.05  # radius of the joint of the equivalent pendulum, and height of its slider [m]
 JOINT_FRICTION = 1e-3
@@ -215,6 +216,15 @@ def at_fidelity(scene: Scene, word: str) -> Scene:
     if word == "backbone":
         return labelled(scene, word)
     return replace(_REDUCTIONS[word](scene), fidelity=word)
+
+
+def check_stack(scene: Any) -> None:
+    """Raise InputError where values of surfaces and bodies are those of a pendulum in place of the given stack."""
+    if scene.fidelity == "equivalent":
+        raise InputError(
+            "fidelity = 'equivalent': its surfaces are those of one pendulum, not of the stack; give 'massless', or a "
+            "study, which changes the stack first"
+        )
 
 
 def labelled(scene: _Scene, word: str) -> _Scene:
@@ -278,11 +288,11 @@ def main_regime(backbone: Backbone) -> tuple[float, float, float]:
     """Friction coefficient, radius [m] and yield displacement [m] of the longest sliding regime of a backbone.
 
     The yield displacement gives a loop to its end the dissipation of the published loop, which begins with the regimes
-    before. The regime is that of the least slope.
+    before. The regime is that of the least slope, of equal ones the first.
     """
     u, force = backbone.points
     slopes = np.diff(force) / np.diff(u)
-    main = int(np.argmin(slopes))
+    main = int(np.flatnonzero(slopes <= slopes.min() * (1 + EQUAL))[0])
     slope = float(slopes[main])
     friction = float(force[main] - slope * u[main])
     missing = friction + slope * u[: main + 1] - force[: main + 1]

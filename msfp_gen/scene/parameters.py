@@ -17,6 +17,7 @@ import numpy as np
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, errors_at, ruled_fields
 from msfp_gen.scene.bearing import Bearing, Body, Surface
+from msfp_gen.scene.fidelity import check_stack
 from msfp_gen.scene.friction_parameters import law_parameters
 from msfp_gen.scene.scene_fields import InitialState
 from msfp_gen.scene.standing import seat_stiffness
@@ -85,6 +86,8 @@ def parameters_of(scene: Scene, paths: Sequence[str], name: str = "gradients") -
     for text in paths:
         with prefixed(f"{name} = {text!r}: "):
             for parameter in _parameters(scene, text):
+                if parameter.part in _ROWS:
+                    check_stack(scene)
                 if parameter.path in parameters:
                     raise InputError(f"{parameter.path} is given twice; give each parameter once")
                 parameters[parameter.path] = parameter

@@ -31,6 +31,7 @@ from msfp_gen.figures.style import (
 )
 from msfp_gen.results.characterise import Characterisation
 from msfp_gen.results.sign import shown_sign
+from msfp_gen.scene.fidelity import check_stack
 from msfp_gen.scene.friction_parameters import proportional, select_friction
 from msfp_gen.scene.scene import Scene
 from msfp_gen.specification.friction_laws import Law, law_of
@@ -167,7 +168,8 @@ def bound(scene: AnyScene, table: FactorTable, *, progress: Progress | None = No
     ends with different ones, they are run again with what any of them needs.
 
     progress: called with the share of the runs that is done, and 1. Raises InputError: a factor of a surface that the
-    bearing does not have, or a bearing that does not move; RunError: no case has rows.
+    bearing does not have, a pendulum that is "equivalent" to a stack, or a bearing that does not move; RunError: no
+    case has rows.
     """
     cases = _cases(scene, table, progress)
     if isinstance(scene, Scene) and (common := _common_effects(scene, cases)) is not None:
@@ -228,6 +230,7 @@ def _lifting(scene: BuildingScene, lifting: Sequence[bool]) -> BuildingScene:
 
 def bounded_scene(scene: AnyScene, table: FactorTable, case: str) -> AnyScene:
     """The scene of one case of CASES. Raises InputError as `bound`."""
+    check_stack(scene)
     label = f"{scene.name or 'scene'}, {case}"
     if isinstance(scene, Scene):
         bearing = _bounded(scene.bearing, scene.law[1], table, case)

@@ -1,7 +1,8 @@
 """The cheapest level: a mass on the published backbones of its bearings, in fixed steps of compiled code.
 
-The backbone up to its regime of least slope is one of elastic and plastic elements in parallel, which reverse as the
-stack does; the regimes after it, in which rims carry, are springs beyond a gap. Force and load act in both directions.
+The backbone is one of elastic and plastic elements in parallel, which reverse as the stack does, until its slope rises
+for the first time; the regimes after that, in which rims carry, are springs beyond a gap. Force and load act in both
+directions.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.buildings.file import load_shares
+from msfp_gen.buildings.file import check_one_ground, load_shares
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.jit.build import load_driver
-from msfp_gen.scene.fidelity import Backbone
+from msfp_gen.scene.fidelity import EQUAL, Backbone
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import MassTop
 
@@ -68,14 +69,16 @@ def run_backbone(scene: AnyScene) -> BackboneRun:
         assert isinstance(scene.top, MassTop)
         stop = 0.0 if scene.stop is None or scene.stop.displacement is None else scene.stop.displacement
         bearings, shares, mass = [_with_rims(scene.bearing, scene.effects)], [1.0], scene.top.mass
+        motion = scene.motion
     else:
         bearings = [_with_rims(one.bearing, one.effects) for one in scene.bearings]
         shares, mass, stop = load_shares(scene), float(scene.axial_loads.sum()) / scene.gravity, 0.0
+        motion = scene.first_ground
     elements, spring, gaps = _elements(tuple(bearings), tuple(shares), mass)
     stiffest = float(elements[0].sum() + spring + gaps[1].max())
     gravity = bearings[0].gravity
     step = min(STEP, STABLE / np.sqrt(gravity * stiffest))
-    ground = _ground(scene.motion, scene.end, float(step))
+    ground = _ground(motion, scene.end, float(step))
     peak, force, steps = _driver().run(elements, spring, gaps, ground, float(step), gravity, stop)
     stopped = steps < len(ground)
     summary: dict[str, Any] = {
@@ -108,6 +111,13 @@ def check_backbone(scene: AnyScene) -> None:
                 raise InputError(
                     f"{name}: the model 'backbone' has none; leave it out, or give another model, such as 'massless'"
                 )
+        if scene.stop is not None and scene.stop.all_rims:
+            raise InputError(
+                "stop.all_rims: the model 'backbone' does not see when rims are met; give stop.displacement, or "
+                "another model, such as 'massless'"
+            )
+    else:
+        check_one_ground(scene, "backbone")
     if np.any(scene.motion.coefficients[:, 3:]):
         other = "massless" if isinstance(scene, Scene) else "rigid"
         raise InputError(
@@ -143,12 +153,13 @@ def _elements(bearings: tuple[Bearing, ...], shares: tuple[float, ...], mass: fl
 def parallel(backbone: Backbone) -> tuple[Array, float, Array]:
     """Elements (stiffness [1/m], strength), shape (2, k), spring [1/m], and gaps (displacement [m], stiffness [1/m]).
 
-    Each element yields where the slope falls. Stiffness and strength are over the load. The last gap is that at which
-    all sliders press on their rims.
+    Each element yields where the slope falls, until it rises for the first time. Stiffness and strength are over the
+    load. The last gap is that at which all sliders press on their rims.
     """
     u, force = backbone.points
     slopes = np.diff(force) / np.diff(u)
-    main = int(np.argmin(slopes))
+    rising = np.append(np.diff(slopes) > slopes[:-1] * EQUAL, True)
+    main = int(np.flatnonzero(rising)[0])
     stiffness = -np.diff(slopes[: main + 1])
     yields = u[1 : main + 1]
     falling = stiffness > 0

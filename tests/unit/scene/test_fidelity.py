@@ -5,10 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from msfp_gen import InitialState, InputError, changed_scene, load_scene, simulate
+from msfp_gen import InitialState, InputError, Limits, Motion, changed_scene, load_scene, simulate
 from msfp_gen.buildings.file import building_at_fidelity
 from msfp_gen.scene.fidelity import LOOSE, Backbone, at_fidelity, equivalent_pendulum, main_regime
-from msfp_gen.scene.file.loader import bearing_from_table
+from msfp_gen.scene.file.loader import bearing_from_table, scene_table
+from msfp_gen.scene.parameters import parameters_of
+from msfp_gen.studies import load_study
+from msfp_gen.studies.batch import run_to_end
+from msfp_gen.studies.bounding import bound, load_factors
 
 PRESETS = ("fenz-tfp", "single-fp", "single-articulated-fp", "double-fp", "double-articulated-fp", "quintuple-fp")
 
@@ -110,6 +114,52 @@ def test_a_rigid_building_keeps_mass_weight_and_loads():
     assert rigid.axial_loads.sum() == pytest.approx(scene.axial_loads.sum(), rel=1e-9)
     one = building_at_fidelity(scene, "equivalent")
     assert one.top.mass * scene.gravity == pytest.approx(scene.weight, rel=1e-9)
+
+
+def test_of_regimes_with_one_slope_the_first_is_taken():
+    """With upper bound friction two regimes of this stack differ in slope by rounding alone, in friction by 1.8."""
+    stack = bearing("fenz-tfp")
+    for factor in (1.6, 2.1228999999999996, 2.1229, 2.5):
+        raised = stack.replace(friction=[factor * surface.friction for surface in stack.surfaces])
+        assert main_regime(Backbone.of(raised))[0] / factor == pytest.approx(0.0317254, rel=1e-5)
+
+
+@pytest.mark.parametrize("word", ["equivalent", "backbone"])
+def test_models_of_one_ground_take_that_of_the_bearings(word):
+    """The motion below the bearings, not that of the scene which none of them has; two of them are refused."""
+    scene = changed_scene("hospital-clc", {"motion.duration": 6.0})
+    own = Motion.harmonic(0.15, 0.5, cycles=1)
+    bearings = [replace(one, motion=own) for one in scene.bearings]
+    moved = replace(scene, bearings=bearings, duration=own.duration)
+    expected = run_to_end(building_at_fidelity(replace(scene, motion=own), word)).summary
+    found = run_to_end(building_at_fidelity(moved, word)).summary
+    for name in ("peak_displacement", "peak_force"):
+        assert found[name]["radial"] == expected[name]["radial"]
+    mixed = replace(moved, bearings=[*bearings[:-1], scene.bearings[-1]])
+    with pytest.raises(InputError, match=f"fidelity = '{word}': it has one motion of the ground"):
+        run_to_end(building_at_fidelity(mixed, word))
+
+
+def test_the_equivalent_of_a_building_keeps_its_limits():
+    scene = replace(load_scene("hospital-clc"), limits=Limits(displacement=0.05))
+    assert building_at_fidelity(scene, "equivalent").limits == scene.limits
+
+
+def test_values_of_the_stack_are_none_of_its_equivalent():
+    """A factor on surface 1 would be one on the whole pendulum: 10 % too much force."""
+    scene = changed_scene("fenz-test2", {"fidelity": "equivalent"})
+    refused = "fidelity = 'equivalent': its surfaces are those of one pendulum"
+    with pytest.raises(InputError, match=refused):
+        bound(scene, load_factors("asce7"))
+    with pytest.raises(InputError, match=refused):
+        parameters_of(scene, ["bearing.surfaces[0].friction"])
+    assert parameters_of(scene, ["motion.amplitude"])[0].value == 0.025
+    factors = {"bounds": {"factors": "asce7"}}
+    study = load_study({"scene": {**scene_table("fenz-test2")[0], "fidelity": "equivalent"}, "axes": factors})
+    stack = load_scene("fenz-test2").bearing
+    for found, factor in ((study.scene(1), 0.595), (study.scene(3), 2.1229)):
+        expected = equivalent_pendulum([stack.replace(friction=[factor * s.friction for s in stack.surfaces])], [1.0])
+        assert found.bearing.surfaces[0].friction == pytest.approx(expected.surfaces[0].friction, rel=1e-6)
 
 
 @pytest.mark.slow

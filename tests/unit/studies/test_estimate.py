@@ -263,8 +263,12 @@ def test_a_fragility_has_the_known_median_and_dispersion():
     assert found.dispersion == pytest.approx(np.sqrt(truth()), rel=0.2)
 
 
-def test_the_backbone_in_parallel_is_the_backbone():
-    backbone = Backbone.of(bearing_from_table({"preset": "prototype-tfp"}), 112e3)
+@pytest.mark.parametrize(("name", "factor"), [("prototype-tfp", 1.0), ("fenz-tfp", 1.6), ("quintuple-fp", 2.1229)])
+def test_the_backbone_in_parallel_is_the_backbone(name, factor):
+    """Also where its slope rises before it is least: with this friction a rim is met before the last surface slides."""
+    bearing = bearing_from_table({"preset": name})
+    bearing = bearing.replace(friction=[factor * surface.friction for surface in bearing.surfaces])
+    backbone = Backbone.of(bearing, 112e3)
     elements, spring, gaps = parallel(backbone)
     for u in np.linspace(0.0, 1.3 * backbone.capacity, 27):
         force = spring * u + np.minimum(elements[0] * u, elements[1]).sum()
@@ -340,6 +344,7 @@ BAD = {
     "models": ({"quantity": "peak_force", "target": 0.1, "models": ["cheap"]}, "accuracy.models has 'cheap'"),
     "no such model": ({"quantity": "peak_force", "target": 0.1, "models": ["rigid"]}, "one bearing has no such model"),
     "no cheaper model": ({"quantity": "peak_force", "target": 0.1}, "the model 'backbone' carries a mass"),
+    "rims unseen": ({"quantity": "peak_force", "target": 0.1}, "stop.all_rims: the model 'backbone' does not see"),
     "key": ({"quantity": "peak_force", "goal": 0.1}, "accuracy.goal: no such key"),
 }
 
@@ -350,6 +355,8 @@ def test_bad_input_is_one_line_and_writes_nothing(tmp_path, case):
     table = small_study(accuracy=accuracy, quantities={"normal": "least(normal_force_1)"})
     if case == "no cheaper model":
         table["scene"] = {**table["scene"], "top": {"kind": "rig", "axial_load": 112e3, "stiffness": 1e9}}
+    if case == "rims unseen":
+        table["scene"] = {**table["scene"], "stop": {"all_rims": True}}
     with pytest.raises(InputError, match=text) as error:
         estimate(table, tmp_path / "out", threads=True)
     assert "\n" not in str(error.value) and not (tmp_path / "out").exists()
