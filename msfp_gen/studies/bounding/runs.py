@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from msfp_gen.results.result import Result
     from msfp_gen.scene.bearing import Bearing
 
+STOPPED = "the run met the stop condition of the scene"
 CASES = ("lower", "nominal", "upper")
 # Word in the name of a model -> the effect that is then prescribed for all cases.
 WIDER: dict[str, tuple[str, Any]] = {
@@ -83,6 +84,20 @@ class Case:
         if self.result is None or self.characterisation is None:
             return None
         return source.value(self.result.summary, self.characterisation)  # type: ignore[no-any-return]
+
+    @property
+    def stopped_at(self) -> float | None:
+        """Time at which the run met the stop condition of its scene [s]; None: it did not."""
+        result = self.result
+        return float(result.summary["duration"]) if result is not None and result.status == "stopped" else None
+
+    @property
+    def verdict(self) -> str:
+        """The verdict of the run, and whether it is of a part of the motion only."""
+        if self.result is None:
+            return "the run failed"
+        met = "" if self.stopped_at is None else f"; {STOPPED} at {self.stopped_at:.4g} s"
+        return self.result.verdict.text + met
 
 
 @dataclass(frozen=True)
@@ -129,7 +144,7 @@ class Bounds:
 
     def verdicts(self) -> dict[str, str]:
         """Case -> the verdict of its run."""
-        return {case.name: "the run failed" if case.result is None else case.result.verdict.text for case in self.cases}
+        return {case.name: case.verdict for case in self.cases}
 
     def governing(self) -> dict[str, str]:
         """Quantity -> the case that governs; left out if a case has no value, or all have the same."""
@@ -153,6 +168,7 @@ class Bounds:
             "cases": {
                 case.name: {
                     "failure": case.failure,
+                    "stopped_at": case.stopped_at,
                     "verdict": None if case.result is None else case.result.verdict.as_dict,
                     "characterisation": case.characterisation and case.characterisation.as_dict(),
                 }

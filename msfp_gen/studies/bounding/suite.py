@@ -68,6 +68,7 @@ class SuiteBounds:
         failures: record and case -> message of a run that failed.
         undefined: column -> why runs that reached their end have no value.
         exceeded: record and case -> the verdict of a run that exceeded limits of the device.
+        stopped: record and case -> time at which a run met the stop condition of the scene [s].
     """
 
     name: str
@@ -78,15 +79,17 @@ class SuiteBounds:
     failures: Mapping[tuple[str, str], str]
     undefined: Mapping[str, str]
     exceeded: Mapping[tuple[str, str], str]
+    stopped: Mapping[tuple[str, str], float]
 
     @cached_property
     def statistics(self) -> tuple[Statistic, ...]:
         """Of each quantity that every run has, and of which the largest or the least value governs."""
-        return tuple(
-            self._statistic(name, values)
-            for name, values in self.values.items()
-            if self.sources[name].quantity.governs and not np.isnan(values).any()
-        )
+        return tuple(self._statistic(name, values) for name, values in self.values.items() if self.has_mean(name))
+
+    def has_mean(self, name: str) -> bool:
+        """Whether a mean of a column is one of whole runs."""
+        known = not self.stopped and not np.isnan(self.values[name]).any()
+        return bool(self.sources[name].quantity.governs) and known
 
     def _statistic(self, name: str, values: Array) -> Statistic:
         quantity, _, part = self.sources[name]
@@ -100,10 +103,11 @@ class SuiteBounds:
     @property
     def left_out(self) -> dict[str, str]:
         """Column -> why it has no statistic, of quantities that would have one."""
-        failed = f"{len(self.failures)} of {len(self.records) * len(CASES)} runs failed, so that a mean would be biased"
-        reasons = dict(self.undefined)
-        if self.failures:
-            reasons |= {name: failed for name, source in self.sources.items() if source.quantity.governs}
+        runs, reasons = len(self.records) * len(CASES), dict(self.undefined)
+        for early, what in ((self.stopped, "met the stop condition of the scene"), (self.failures, "failed")):
+            if early:
+                why = f"{len(early)} of {runs} runs {what}, so that a mean would be biased"
+                reasons |= {name: why for name, source in self.sources.items() if source.quantity.governs}
         return reasons
 
     def as_dict(self) -> dict[str, Any]:
@@ -114,6 +118,7 @@ class SuiteBounds:
             "statistics": [vars(statistic) | {"envelope": statistic.envelope} for statistic in self.statistics],
             "left_out": self.left_out,
             "exceeded": [{"record": r, "case": c, "verdict": text} for (r, c), text in self.exceeded.items()],
+            "stopped": [{"record": r, "case": c, "time": time} for (r, c), time in self.stopped.items()],
             "failures": [{"record": r, "case": c, "message": text} for (r, c), text in self.failures.items()],
         }
 
@@ -133,6 +138,7 @@ def bound_suite(
     failures: dict[tuple[str, str], str] = {}
     undefined: dict[str, str] = {}
     exceeded: dict[tuple[str, str], str] = {}
+    stopped: dict[tuple[str, str], float] = {}
     for row, (record, scene) in enumerate(scenes.items()):
         part = None if progress is None else _share(progress, row, len(scenes))
         try:
@@ -143,6 +149,8 @@ def bound_suite(
         for column, case in enumerate(cases):
             if case.result is not None and case.result.verdict.exceeded:
                 exceeded[record, case.name] = case.result.verdict.text
+            if case.stopped_at is not None:
+                stopped[record, case.name] = case.stopped_at
             if case.result is None or case.characterisation is None:
                 failures[record, case.name] = case.failure
                 continue
@@ -155,7 +163,7 @@ def bound_suite(
         raise RunError(
             f"no run of the suite reached its end; the first: {next(iter(failures.values()))}", status="bound"
         )
-    return SuiteBounds(name, table, tuple(scenes), sources, values, failures, undefined, exceeded)
+    return SuiteBounds(name, table, tuple(scenes), sources, values, failures, undefined, exceeded, stopped)
 
 
 def _share(progress: Progress, row: int, count: int) -> Progress:
@@ -192,11 +200,13 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
     columns = ("", *(f"mean {case}" for case in CASES), *(f"worst {case}" for case in CASES), "governs", "worst record")
     reasons = [(_label(name, bounds.sources[name].part), why) for name, why in bounds.left_out.items()]
     exceeded = [(f"{record}, {case}", verdict) for (record, case), verdict in bounds.exceeded.items()]
+    stopped = [(f"{record}, {case}", f"{time:.4g} s") for (record, case), time in bounds.stopped.items()]
     failed = [(f"{record}, {case}", message) for (record, case), message in bounds.failures.items()]
     tables = [
         Table(f"{len(bounds.records)} records at bounds by {bounds.table.name}: means and worst values", columns, rows),
         Table("what has no mean, and why", (), reasons),
         Table("limits of the device that runs exceeded (docs/limits.md)", (), exceeded),
+        Table("runs that met the stop condition of the scene", (), stopped),
         Table("runs that failed", (), failed),
     ]
     return [table for table in tables if table.rows]
@@ -235,6 +245,7 @@ def write_records(bounds: SuiteBounds, path: str | Path) -> Path:
         ("record", ""): [record for record, _ in runs],
         ("case", ""): [case for _, case in runs],
         ("failure", ""): [bounds.failures.get(run, "") for run in runs],
+        ("stopped at", "s"): [bounds.stopped.get(run) for run in runs],
         ("limits exceeded", ""): [bounds.exceeded.get(run, "") for run in runs],
     }
     for name, values in bounds.values.items():
@@ -267,7 +278,7 @@ def _draw(axes: Axes, bounds: SuiteBounds, name: str, colours: Sequence[str]) ->
     values = bounds.values[name] * scale
     for record, of_record, colour in zip(bounds.records, values, colours, strict=True):
         axes.plot(CASES, of_record, color=colour, marker="o", markersize=4, label=plain(record))
-    if not np.isnan(values).any():
+    if bounds.has_mean(name):
         axes.plot(CASES, values.mean(axis=0), color=INK, linewidth=2.5, label="mean")
     axes.set(title=name.replace("_", " "), ylabel=f"[{unit}]")
     axes.set_ylim(bottom=min(0.0, float(np.nanmin(values))))

@@ -29,10 +29,12 @@ from msfp_gen import (
     Solver,
     Surface,
     Top,
+    changed_scene,
     load_scene,
 )
 from msfp_gen.cli import main
 from msfp_gen.figures.style import COLOURS, distinct
+from msfp_gen.scene.file.loader import scene_text
 from msfp_gen.studies.bounding import CASES, Bounds, bound, bounded_scenes, factor_tables, load_factors
 from msfp_gen.studies.bounding.runs import _scaled, plot_bounds
 from msfp_gen.studies.bounding.suite import _quantities
@@ -416,6 +418,24 @@ def test_a_suite_with_a_failed_run_has_no_mean(upper_fails: None, tmp_path: Path
     assert "error: 2 runs did not reach their end; the first: ridgecrest-2019-ci-clc, upper: " in error
     assert len((out / "suite.csv").read_text().splitlines()) == 1 and (out / "suite.png").is_file()
     assert (out / "records.csv").read_text().count("jammed") == 2
+
+
+def test_a_run_that_met_its_stop_condition_is_none_of_a_mean(tmp_path: Path, capsys: Any) -> None:
+    """Its values are those until then: all runs of this suite would have one displacement, that of the condition."""
+    scene = changed_scene("ridgecrest-clc", {"stop": {"displacement": 5e-3}})
+    path = tmp_path / "scene.toml"
+    path.write_text(scene_text(scene))
+    out = tmp_path / "out"
+    suite = suite_file(tmp_path)
+    assert main(["bound", str(path), "--suite", str(suite), "--factors", "asce7-quality", "-o", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "6 of 6 runs met the stop condition of the scene, so that a mean would be biased" in printed
+    assert len((out / "suite.csv").read_text().splitlines()) == 1
+    with (out / "records.csv").open() as file:
+        assert all(0 < float(run["stopped at [s]"]) < 6.0 for run in csv.DictReader(file))
+    case = bound(scene, load_factors("asce7-quality")).cases[0]
+    assert case.result is not None and case.stopped_at == case.result.summary["duration"]
+    assert case.verdict.endswith(f"; the run met the stop condition of the scene at {case.stopped_at:.4g} s")
 
 
 def test_records_of_a_suite_have_different_colours() -> None:
