@@ -427,7 +427,6 @@ def _simulate_building(
     threads: int | None,
 ) -> BuildingResult:
     """`simulate` of a building; the RunError names the bearing."""
-    begin = time.monotonic()
     run = start_building(scene, threads)
     saved = None
     if checkpoint is not None:
@@ -435,7 +434,9 @@ def _simulate_building(
         identity = Identity(run.build, scene_text(scene) + dumps({"motion": motion}), fingerprint(scene))
         saved = Checkpoint(checkpoint, identity, every, resume)
         saved.restore(run)
+    begin = time.perf_counter()
     status = _advance(run, lambda: run.run.advance(BUILDING_STEPS_PER_CALL) or run.switch(), scene.end, progress, saved)
+    wall = time.perf_counter() - begin + (0.0 if saved is None else saved.wall)
     message, result = "", None
     if status != "ok":
         _, bearing, surface, value = run.status
@@ -443,7 +444,7 @@ def _simulate_building(
         message = f"{who}: {stopped(run.time, scene.end, status, surface, value)}"
     if status == "ok" or run.run.row_count:
         about = provenance_of(scene.solver, ", ".join(spec.key for spec in scene.specs))
-        ended: dict[str, Any] = {"status": status, "message": message, "wall_time": time.monotonic() - begin}
+        ended: dict[str, Any] = {"status": status, "message": message, "wall_time": wall}
         result = replace(building_result(run), provenance=about, **ended)
     if result is None or message:
         raise RunError(message, status=status, result=result)

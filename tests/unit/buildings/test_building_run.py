@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from time import sleep
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +13,7 @@ from support.buildings import BEARING, INTERFACE, LOAD, MOTION, frame, scene
 
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, InputError, Motion, RunError, simulate
 from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation.building_run import result_of, start_run
 
 EVENTFUL = scene(frame(), duration=0.8)
@@ -54,7 +56,21 @@ def test_an_interrupted_run_is_resumed_bit_by_bit(tmp_path):
         simulate(EVENTFUL, progress=interrupt, checkpoint=file)
     assert caught.value.status == "interrupted" and 1 < len(caught.value.result.time) < 81
     assert calls[-1][1] == EVENTFUL.end
-    assert same(simulate(EVENTFUL, checkpoint=file, resume=True), simulate(EVENTFUL))
+    before = checkpoint.read(file)[0]["wall"]
+    resumed = simulate(EVENTFUL, checkpoint=file, resume=True)
+    assert same(resumed, simulate(EVENTFUL))
+    assert resumed.wall_time > before > 0, "the time of both processes"
+
+
+def test_the_time_of_a_run_has_none_of_making_its_models(monkeypatch):
+    """Of a run whose models are compiled it would be tens of seconds for one."""
+
+    def slow(*arguments: Any) -> Any:
+        sleep(2.0)
+        return start_run(*arguments)
+
+    monkeypatch.setattr("msfp_gen.simulation.simulate.start_building", slow)
+    assert 0 < simulate(replace(EVENTFUL, duration=0.02)).wall_time < 1.5
 
 
 def test_a_checkpoint_of_another_building_is_refused(tmp_path):
