@@ -55,6 +55,7 @@ CHOSEN: dict[str, tuple[str, ...]] = {
     "generator/latex.py": ("tests/unit/generator",),
     "generator/interface.py": ("tests/unit/generator", "tests/unit/embedding/test_library.py"),
     "generator/emit.py": (EQUATIONS, "tests/unit/generator", "tests/unit/results/test_extremes.py"),
+    "generator/energy.py": (RUNS, "tests/physics/test_quasistatic.py"),
     "generator/two_port.py": ("tests/unit/embedding/test_two_port.py", "tests/physics/test_two_port.py"),
     "generator/laws.py": (
         "tests/physics/test_friction_laws.py",
@@ -76,7 +77,12 @@ CHOSEN: dict[str, tuple[str, ...]] = {
     "*/runtime/steppers/quasistatic.c": ("tests/physics/test_quasistatic.py",),
     "*/runtime/steppers/*": ("tests/hard/test_convergence.py", "tests/unit/runtime/test_esdirk.py"),
     "msfp_gen/simulation/outcome.py": ("tests/unit/simulation/test_notes.py", "tests/physics/test_hysteresis.py"),
-    "*/runtime/run/monitors.c": ("tests/unit/simulation/test_auto.py", "tests/physics/test_friction_laws.py"),
+    "*/runtime/run/monitors.c": (
+        "tests/unit/simulation/test_auto.py",
+        "tests/physics/test_friction_laws.py",
+        "tests/unit/simulation/test_failures.py",
+    ),
+    "*/runtime/run/snapshot.c": ("tests/unit/simulation/test_checkpoint.py", "tests/unit/simulation/test_stream.py"),
     "*/runtime/run/*": (RUNS, "tests/hard/test_limits.py", "tests/hard/test_rims.py", "tests/hard/test_ladder.py"),
     "*/runtime/gradients/*": ("tests/physics/test_gradients.py", "tests/unit/simulation/test_gradients.py"),
     "*/runtime/port/*": ("tests/unit/embedding/test_two_port.py", "tests/physics/test_two_port.py"),

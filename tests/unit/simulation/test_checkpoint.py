@@ -82,6 +82,21 @@ def test_a_run_stopped_twice_gives_the_same_rows(case: str, tmp_path: Path) -> N
     assert [each.name for each in tmp_path.iterdir()] == ["run.ck"]
 
 
+def test_a_snapshot_of_a_run_with_a_single_row_is_restored() -> None:
+    """Before the first step, and after rows were dropped that are on a disk."""
+    scene = scene_of("fenz-test2", duration=1.0)
+    model = build_model(scene.bearing.layout, scene.modelled)
+    run, later = (start_run(scene, model, scene.effect_selection, scene.end, None, ())[0] for _ in range(2))
+    later.restore(run.snapshot())
+    run.advance(20)
+    run.drop_rows()
+    assert len(run.rows) == 1 and len(later.rows) == 1
+    later.restore(run.snapshot())
+    for _ in iter(lambda: run.advance() | later.advance(), False):
+        pass
+    assert run.rows[-1].tolist() == later.rows[-1].tolist() and run.status == later.status
+
+
 def test_what_an_interrupted_run_had_is_a_beginning_of_the_whole(tmp_path: Path) -> None:
     whole, part = preset_run("fenz-test2"), interrupted(scene_of("fenz-test2"), tmp_path / "run.ck", 20.0)
     count = len(part.history.time)

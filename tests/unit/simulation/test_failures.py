@@ -66,11 +66,18 @@ def test_massless_sliders_without_a_unique_motion_name_the_remedy(damping: float
     assert simulate(replace(scene, effects=replace(effects, sliders="inertial"))).succeeded
 
 
-@pytest.mark.parametrize("top", [Top.rig(0.0, 1e8), Top.prescribed((0.0, 0.0, 5e3))], ids=["lifted off", "pulled up"])
-def test_uplift_at_the_start_keeps_no_false_rows(top: Top) -> None:
+@pytest.mark.parametrize(
+    ("top", "named"),
+    [
+        (Top.rig(0.0, 1e8), r"surface 4, P\.t3 \[N\] = "),
+        (Top.prescribed((0.0, 0.0, 5e3)), r"surface 1, P\.t3 \[N\] = -"),
+    ],
+    ids=["lifted off", "pulled up"],
+)
+def test_uplift_at_the_start_keeps_no_false_rows(top: Top, named: str) -> None:
     """Without axial load a falling base lifts off; pulled up it does so at once, and there is nothing to keep."""
     error = failure_of(Scene(presets.bearing("fenz-tfp"), drop(12.0), top, Effects()))
-    assert error.status == "uplift" and "surface" in str(error)
+    assert error.status == "uplift" and re.search(named, str(error)), str(error)
     if isinstance(error.result, Result):
         assert error.result.history.normal_force.min() > 0
 
