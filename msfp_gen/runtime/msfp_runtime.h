@@ -70,7 +70,7 @@ typedef struct {
     double rim_cosine[MSFP_NB]; /* cos(s_c/R), the cosine of the tilt at which the rim is met; 2: it holds the slider */
     double rim_slope[MSFP_NB];  /* d gap/d cosine at that tilt [m] */
     double weight;              /* of the moving bodies and the supported mass [N] */
-    /* The values that these are made of, some of which are not used; they come last. */
+    /* The values from which these are computed, some of which a run does not use; they come last. */
     double body_values[MSFP_NB + 1][MSFP_BODY_VALUES_SIZE], surface_values[MSFP_NB][MSFP_SURFACE_VALUES_SIZE];
     double top_values[MSFP_TOP_VALUES_SIZE], sides[MSFP_NB + 1][MSFP_SIDES_SIZE], around[MSFP_AROUND_SIZE];
 } msfp_parameters;
@@ -114,7 +114,7 @@ typedef struct {
 #endif
 } msfp_seed;
 
-/* What the states of a surface follow from: dY/dt, dZ/dt, and the source of a memory. */
+/* Rates of the states of a surface: dY/dt, dZ/dt, and the source of a memory. */
 #define MSFP_SURFACE_RATES (MSFP_SHEAR_SIZE + (MSFP_MEMORY > 0))
 /* Rows of the Jacobian of a contact: its moment, N, and in models with gradients these rates. */
 #define MSFP_CONTACT_ROWS (MSFP_MOMENT_SIZE + 1 + MSFP_GRADIENTS * MSFP_SURFACE_RATES)
@@ -292,11 +292,11 @@ typedef struct {
  * stop displacement, and with uplift the compression of every unilateral contact. */
 #define MSFP_EVENTS (MSFP_NB + 1 + MSFP_UPLIFT * MSFP_NB)
 
-/* Fields that hold one number for each of what is named, or with gradients one array of derivatives ("columns"): the
- * coordinates q as in msfp_point; from v to work what the methods integrate besides; from a to power its rates in the same
- * order, those of q being v. f: Y, Z [-]; foot: height of the foot of the supported mass and its velocity; memory:
- * parts of what surfaces remember, see memory.c; work: integrals [J], power: integrands [W]; prescribed_power, load_power: the
- * parts of the power of the input, see msfp_input_parts. */
+/* Fields of a state. type: double, or for gradients an array of derivatives ("columns"). The methods integrate q, the
+ * coordinates as in msfp_point, and the fields from v to work. The rates of q are v; the rates of the others are the
+ * fields from a to power, in the same order. f: Y, Z [-]; foot: height of the foot of the supported mass and its
+ * velocity; memory: parts of the memories of the surfaces, see memory.c; work: integrals [J], power: integrands [W];
+ * prescribed_power, load_power: parts of the power of the input, see msfp_input_parts. */
 #if MSFP_MEMORY
 #define MSFP_MEMORY_FIELD(type, name) type name[MSFP_NB][MSFP_MEMORY];
 #else
@@ -331,7 +331,7 @@ typedef struct {
 } msfp_node;
 
 #if MSFP_CLOSED_FORM
-/* What a quasi-static step uses of the step before it. */
+/* Values of the step before, which a quasi-static step uses. */
 typedef struct {
     double q[MSFP_NB];       /* theta before that step [rad] */
     double h;                /* its length [s]; 0: no step since the start or a jump */
@@ -343,7 +343,7 @@ typedef struct {
 } msfp_step_history;
 #endif
 
-/* What the monitors know at the end of an accepted step. */
+/* State of the monitors at the end of an accepted step. */
 typedef struct {
     double velocity[MSFP_NB][3];           /* of the bodies [m/s] */
     double heat[MSFP_NB][MSFP_HEAT_STATES], flux[MSFP_NB]; /* of the monitor of heat: as of memory.c, and its source */

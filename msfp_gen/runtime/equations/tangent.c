@@ -1,8 +1,8 @@
 /* tangent.c: the tangent at the top, and, without uplift, the fast tangent of the condensed equations: an unknown moves
  * its body and all bodies above it as one rigid body.
  *
- * Columns are formed from the top down in body-fixed frames (generator/columns.py). A body above an unknown sees only
- * the variation of its angular velocity and acceleration, a body below only the variation of the interface force.
+ * Columns are formed from the top down in body-fixed frames (generator/columns.py). Of a body above an unknown only the
+ * angular velocity and acceleration vary, of a body below only the interface force.
  */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("O3") /* unrolls and vectorises the short loops over columns */

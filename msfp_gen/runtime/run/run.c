@@ -42,7 +42,7 @@ static int solve_initial_state(msfp_run *run)
     return msfp_check_state(run, &run->work, &run->now);
 }
 
-/* Where all that is given is finite and no solution is, Newton's method has diverged. */
+/* Where the inputs are finite and the solution is not, Newton's method has diverged. */
 int msfp_consistent_initial_state(msfp_run *run)
 {
     const int status = solve_initial_state(run);
@@ -140,8 +140,8 @@ static double latest_end(msfp_run *run)
     return end;
 }
 
-/* One step of length h of the method; it is not accepted yet. A prescribed step, from which derivatives are estimated by
- * differences, is that of another run: it is not refused for its energy balance. */
+/* One step of length h of the method; it is not accepted yet. A prescribed step repeats one of another run, so that
+ * derivatives follow by differences: it is not refused for its energy balance. */
 static int try_step(msfp_run *run, double h, int prescribed, double *error)
 {
     run->status_surface = 0;

@@ -68,7 +68,7 @@ double msfp_next_output(const msfp_run *run);
 int msfp_write_row(msfp_run *run, const msfp_state *s);
 /* Rows of the accepted step. */
 int msfp_write_step(msfp_run *run);
-/* What a row inside a step keeps although its polynomial does not. */
+/* Bounds of a row inside a step, which its interpolating polynomial may exceed. */
 typedef struct {
     double share[MSFP_NB], most[MSFP_NB]; /* Y, Z times `share` have the size `most` [-]; share 1: they are kept */
     int row[MSFP_NB];                     /* of those it is interpolated from, that which has this size; -1: none */
