@@ -266,6 +266,22 @@ def test_a_forged_snapshot_is_refused_before_it_is_used(saved: Path, tmp_path: P
         assert "damaged (" in refusal(scene_of("fenz-test2"), path), name
 
 
+def test_a_forged_event_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.ck"
+    interrupted(scene_for("planar, rims met"), path, 70.0)
+    about, snapshot = checkpoint.read(path)
+    _, _, row, _, _, size, rows, events, _ = HEADER.unpack_from(snapshot)
+    assert events > 0
+    first = size + rows * row
+    for place, content in (
+        (0, struct.pack("<d", float("nan"))),
+        (8, struct.pack("<i", 99)),
+        (12, struct.pack("<i", 99)),
+    ):
+        checkpoint.write(path, about, forged(snapshot, first + place, content))
+        assert "damaged (" in refusal(scene_for("planar, rims met"), path), place
+
+
 def test_a_byte_changed_anywhere_in_the_state_ends_no_process(saved: Path) -> None:
     """Refused, or a run goes on from it to a status: with the right checksum, whatever the byte is."""
     snapshot = checkpoint.read(saved)[1]

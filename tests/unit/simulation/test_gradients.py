@@ -31,6 +31,7 @@ from msfp_gen.results.history import Extremes
 from msfp_gen.scene.parameters import parameters_of
 from msfp_gen.simulation.gradients import measured_errors, start_gradients, with_gradient_errors
 from msfp_gen.simulation.simulate import RunSequence
+from msfp_gen.simulation.start import start_slopes, state_at_rest
 
 PATHS = ("bearing.surfaces[*].friction", "top.axial_load", "motion.scale")
 
@@ -179,6 +180,21 @@ def test_a_file_that_lacks_one_of_the_energies_is_refused(tmp_path: Path) -> Non
         del file["gradient"]["energy_numerical"], file.attrs["digest"]
     with pytest.raises(InputError, match="energy_numerical is missing"):
         Result.from_netcdf(path)
+
+
+def test_the_start_after_settling_is_differentiated_where_its_friction_is_limited() -> None:
+    """The friction state of the last row, on two surfaces larger than 1, against differences of the start."""
+    run = result()
+    assert run.gradients is not None
+    history, slope = run.history, run.gradients.arrays["friction_state"][:, -1]
+    h = np.array([[1.1, 0.4], [0.3, -0.2], [0.0, -1.3], [0.7, 0.7]])
+    last = replace(history, friction_state=np.concatenate([history.friction_state[:-1], h[None]]))
+    dq, dh = start_slopes(last, run.gradients, parameters_of(run.scene, PATHS))
+    assert np.array_equal(dq, run.gradients.arrays["tilt_angles"][:, -1]) and np.abs(slope).max() > 0
+    for found, along in zip(dh, slope, strict=True):
+        step = 1e-6 / np.abs(along).max()
+        ends = [state_at_rest(history.tilt_angles[-1], h + side * step * along).h for side in (1, -1)]
+        assert found == pytest.approx((np.array(ends[0]) - np.array(ends[1])) / (2 * step), rel=1e-6, abs=1e-9)
 
 
 def test_without_gradients_there_is_none() -> None:
