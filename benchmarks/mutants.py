@@ -76,6 +76,10 @@ CHOSEN: dict[str, tuple[str, ...]] = {
     "*/runtime/equations/*": (EQUATIONS, "tests/physics/test_reference.py"),
     "*/runtime/steppers/quasistatic.c": ("tests/physics/test_quasistatic.py",),
     "*/runtime/steppers/*": ("tests/hard/test_convergence.py", "tests/unit/runtime/test_esdirk.py"),
+    "msfp_gen/simulation/gradients.py": (
+        "tests/unit/simulation/test_gradients.py",
+        "tests/physics/test_gradients.py",
+    ),
     "msfp_gen/simulation/outcome.py": ("tests/unit/simulation/test_notes.py", "tests/physics/test_hysteresis.py"),
     "*/runtime/run/monitors.c": (
         "tests/unit/simulation/test_auto.py",
