@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 from support import scene_of
+from support.stacks import a_stack, nested_radii
 
 from msfp_gen import (
     Auto,
@@ -22,13 +24,15 @@ from msfp_gen import (
     RunError,
     Scene,
     Stop,
+    Top,
     load_scene,
     simulate,
     simulate_batch,
 )
+from msfp_gen.model.compiled import bodies_and_surfaces, top_values
 from msfp_gen.model.model import build_model
 from msfp_gen.results.history import Extremes
-from msfp_gen.scene.parameters import parameters_of
+from msfp_gen.scene.parameters import changed_parameters, parameters_of
 from msfp_gen.simulation.gradients import measured_errors, start_gradients, with_gradient_errors
 from msfp_gen.simulation.simulate import RunSequence
 from msfp_gen.simulation.start import start_slopes, state_at_rest
@@ -180,6 +184,47 @@ def test_a_file_that_lacks_one_of_the_energies_is_refused(tmp_path: Path) -> Non
         del file["gradient"]["energy_numerical"], file.attrs["digest"]
     with pytest.raises(InputError, match="energy_numerical is missing"):
         Result.from_netcdf(path)
+
+
+class Seeds:
+    """In place of a compiled run: keeps the derivatives of its inputs that it is given."""
+
+    def start_gradients(self, **arrays: Any) -> None:
+        self.arrays = arrays
+
+
+@pytest.mark.parametrize("uplift", [False, True])
+@pytest.mark.parametrize("layout", [(2, 0, 1), (3, 1, 1)])
+def test_every_value_of_bearing_and_top_is_differentiated(layout: tuple[int, int, int], uplift: bool) -> None:
+    """Derivatives of what the compiled run is given, against differences of it."""
+    bearing = a_stack(layout, nested_radii(layout), reference_pressure=2e7, velocity_rate=50.0, patch_radius=None)
+    bearing = replace(bearing, base_rim_radius=0.012, base_rim_offset=0.003, base_centroid=0.01)
+    top = Top.mass(2e4, (3e3, 5e3), 0.7, 1e6, 2e3, vertical_stiffness=5e7, vertical_damping=2e4)
+    effects = Effects(friction="pv", uplift=uplift)
+    scene = Scene(bearing, Motion.harmonic(0.05, 0.5, cycles=1.0), top, effects)
+    fields = ["height", "centroid", "mass", "inertia[*]", "rim_radius", "rim_offset"]
+    paths = [f"bearing.bodies[*].{name}" for name in fields]
+    fields = ["radius", "friction", "yield_displacement", "capacity", "rim_stiffness", "rim_damping", "contact_damping",
+              "reference_pressure", "velocity_rate"]  # fmt: skip
+    paths += [f"bearing.surfaces[*].{name}" for name in fields]
+    paths += [f"bearing.{name}" for name in ("base_height", "base_rim_radius", "base_rim_offset", "gravity")]
+    fields = ["mass", "inertia[*]", "height", "rotational_stiffness", "rotational_damping", "vertical_stiffness",
+              "vertical_damping"]  # fmt: skip
+    parameters = parameters_of(scene, [*paths, *(f"top.{name}" for name in fields)])
+    model, seeds = SimpleNamespace(layout=bearing.layout, effects=effects, planar=False), Seeds()
+    start_gradients(seeds, scene, model, parameters)  # type: ignore[arg-type]
+
+    def inputs(values: dict[Any, float]) -> list[Any]:
+        other = changed_parameters(scene, values)
+        return [*bodies_and_surfaces(other.bearing, effects, other.top), top_values(other.top), other.bearing.gravity]
+
+    for row, parameter in enumerate(parameters):
+        step = 1e-5 * (abs(parameter.value) or 1e-3)
+        ends = [inputs({parameter: parameter.value + side * step}) for side in (0, 1, 2)]
+        for name, at, plus, further in zip(("bodies", "surfaces", "top", "gravity"), *ends, strict=True):
+            slope = (4 * np.asarray(plus) - 3 * np.asarray(at) - np.asarray(further)) / (2 * step)
+            found = seeds.arrays[name][row]
+            assert found == pytest.approx(slope, rel=1e-5, abs=1e-9 * np.abs(at).max() / step), (parameter.path, name)
 
 
 def test_the_start_after_settling_is_differentiated_where_its_friction_is_limited() -> None:
