@@ -24,7 +24,7 @@ from msfp_gen.common.inputs import Kept, digest_of, expecting
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.fidelity import LEVEL, LOOSE, at_fidelity, equivalent_pendulum, implicit_solver, labelled
-from msfp_gen.scene.file.changes import changed_table, keys_of
+from msfp_gen.scene.file.changes import COMMON, changed_table, keys_of
 from msfp_gen.scene.file.loader import (
     bearing_from_table,
     effects_from_table,
@@ -97,7 +97,6 @@ SCENE = model_of(
 _buildings: Kept[Building] = Kept(256 << 20, lambda building: 3 * building.mass.nbytes)
 MATRICES = paths_in(FrameTable)
 FILES = {"motion": paths_in(*KINDS.values()), "building": MATRICES}  # table -> its keys that are paths of files
-COMMON = ("interface", "soil", "effects")  # tables of [building] for all bearings that have none of their own
 
 
 def building_from_table(

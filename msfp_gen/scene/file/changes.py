@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping
 from copy import copy, deepcopy
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from msfp_gen.common.errors import InputError, prefixed
@@ -15,6 +16,8 @@ from msfp_gen.scene.file.loader import MAX_DEPTH, complete_bearing, complete_par
 Table = dict[str, Any]
 Key = str | int | None  # of a table, of a list, of all rows of a list
 _STEP = re.compile(r"([^\[\].]+)((?:\[(?:\d+|\*)\])*)")
+COMMON = ("interface", "soil", "effects")  # tables of [building] for all bearings that have none of their own
+NONE: Mapping[str, Any] = MappingProxyType({})
 ROWS = {"surfaces": Surface, "bodies": Body}
 _COLUMNS = {  # a field of surfaces or bodies -> their list, and whether one value is a list of numbers
     name: (rows, isinstance(rule, Quantity) and bool(rule.shape))
@@ -45,9 +48,9 @@ def changed_table(
     """A copy of a table with the fields at some paths set; the schema checks afterwards that they exist.
 
     `[i]` in a path is a row of a list, from 0; `[*]` stands for all rows. A bearing that a preset gives, or the name of
-    one in `[bearings]`, becomes a table of its own where a path leads into it. `bearing.friction` is a column: one
-    value for all surfaces or a list, in a complete bearing too. surfaces: of a column only these, from 1. Raises
-    InputError.
+    one in `[bearings]`, becomes a table of its own where a path leads into it; so does what a bearing of a building
+    has in common with others. `bearing.friction` is a column: one value for all surfaces or a list, in a complete
+    bearing too. surfaces: of a column only these, from 1. Raises InputError.
     """
     changed = dict(table)
     for path, value in changes.items():
@@ -96,22 +99,27 @@ def _places(walk: _Walk, path: str) -> Iterator[_Place]:
     return _inner_places(walk, walk.root, keys)
 
 
-def _inner_places(walk: _Walk, inner: Any, keys: list[Key]) -> Iterator[_Place]:
-    """The places to which keys lead from `inner`, which is a copy, as all that they lead through becomes one."""
+def _inner_places(walk: _Walk, inner: Any, keys: list[Key], common: Mapping[str, Any] = NONE) -> Iterator[_Place]:
+    """The places to which keys lead from `inner`, which is a copy, as all that they lead through becomes one.
+
+    common: the tables that bearings of a building have where they have none of their own.
+    """
     key, *rest = keys
     for step in [key] if isinstance(key, str) else _rows(inner, key):
         if not rest:
             yield _Place(inner, step)
             continue
         if isinstance(step, str):
-            inner.setdefault(step, {})
+            inner.setdefault(step, copy(common[step]) if isinstance(common.get(step), dict) else {})
         inner[step] = _own_bearing(walk, inner[step], rest[0]) if step == "bearing" else copy(inner[step])
         if isinstance(rest[0], str) and not isinstance(inner[step], dict):
             raise InputError(f"{step} is {inner[step]!r} here, which has no fields to change")
+        if step == "building" and isinstance(inner[step], dict):
+            common = {name: inner[step].get(name) for name in COMMON}
         if step == "bearing" and len(rest) == 1 and rest[0] in _COLUMNS and "layout" in inner[step]:
             yield from _column(walk, inner[step], str(rest[0]))
         else:
-            yield from _inner_places(walk, inner[step], rest)
+            yield from _inner_places(walk, inner[step], rest, common)
 
 
 def _column(walk: _Walk, bearing: Table, name: str) -> Iterator[_Place]:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from msfp_gen import InputError, changed_scene, load_scene, presets
-from msfp_gen.scene.file.changes import changed_table, keys_of
+from msfp_gen.scene.file.changes import changed_table, keys_of, multiplied_table
 
 TABLE: dict[str, Any] = {
     "motion": {"scale": 1.0},
@@ -47,6 +47,22 @@ def test_the_table_that_is_given_stays():
     )
     assert changed["building"]["bearing"][0]["bearing"] == {"preset": "fenz-tfp", "gravity": 9.81, "friction": 0.05}
     assert changed["bearings"] == TABLE["bearings"]
+
+
+def test_a_bearing_of_a_building_keeps_what_it_has_in_common():
+    """A change of its uplift alone had taken friction and hysteresis of `[building.effects]` from it."""
+    common = {"effects": {"friction": "pvt", "bouc_wen": "plastic"}, "interface": {"stiffness": 1e8, "damping": 1e5}}
+    table = {"building": {**TABLE["building"], **common}}
+    changes = {"building.bearing[1].effects.uplift": True, "building.bearing[*].interface.damping": 0.0}
+    first, second = changed_table(table, changes)["building"]["bearing"]
+    assert second["effects"] == {**common["effects"], "uplift": True} and "effects" not in first
+    assert first["interface"] == second["interface"] == {"stiffness": 1e8, "damping": 0.0}
+    assert table["building"]["interface"]["damping"] == 1e5
+    halved = multiplied_table(table, "building.bearing[1].interface.damping", 0.5)["building"]
+    assert halved["bearing"][1]["interface"]["damping"] == 5e4 and halved["interface"]["damping"] == 1e5
+    plain = {"building": {**TABLE["building"], "effects": "auto"}}
+    (_, alone) = changed_table(plain, {"building.bearing[1].effects.uplift": True})["building"]["bearing"]
+    assert alone["effects"] == {"uplift": True}
 
 
 def test_one_surface_of_the_bearing_of_a_preset():
