@@ -251,7 +251,7 @@ def scene_of(table: Mapping[str, Any], folder: Path | None = None, **parts: Any)
 
 def reduced(scene: AnyScene, word: str) -> AnyScene:
     """The scene at a level of fidelity. Raises InputError: an unknown one, or one that it does not have."""
-    if word not in FIDELITIES:
+    if not isinstance(word, str) or word not in FIDELITIES:
         raise InputError(f"fidelity = {word!r}: give one of {', '.join(map(repr, FIDELITIES))}")
     return at_fidelity(scene, word) if isinstance(scene, Scene) else building_at_fidelity(scene, word)
 

@@ -427,11 +427,12 @@ class SceneFactory:
                 table = {**table, "motion": motion_of(self._scaled(value, scale))}
             for path in axis.paths if axis.change == "multiplies" else ():
                 table = multiplied_table(table, path, value, axis.surfaces)
-        scene = scene_of(table, **self._given)
+        word: Any = table.get("fidelity", self._fidelity)
+        scene = scene_of({key: value for key, value in table.items() if key != "fidelity"}, **self._given)
         for axis, value in chosen:
             if axis.change == "factors":
                 scene = bounded_scene(scene, self.recipe.factors[axis.paths[0]], value)
-        return reduced(scene, self._fidelity)
+        return reduced(scene, word)
 
     def _scaled(self, name: str, factor: float) -> Table:
         """The `[motion]` table of a record times a factor."""

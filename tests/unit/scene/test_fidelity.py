@@ -116,6 +116,19 @@ def test_a_rigid_building_keeps_mass_weight_and_loads():
     assert one.top.mass * scene.gravity == pytest.approx(scene.weight, rel=1e-9)
 
 
+def test_a_level_may_be_an_axis_beside_factors():
+    """Factors act on the stack before it is reduced, whichever of the two comes first."""
+    level, factors = {"level": {"sets": "fidelity", "values": ["equivalent"]}}, {"bounds": {"factors": "asce7"}}
+    alone = load_study({"scene": {**scene_table("fenz-test2")[0], "fidelity": "equivalent"}, "axes": factors})
+    for axes in ({**level, **factors}, {**factors, **level}):
+        study = load_study({"scene": "fenz-test2", "axes": axes})
+        for run in (1, 2, 3):
+            assert study.scene(run).bearing == alone.scene(run).bearing and study.scene(run).fidelity == "equivalent"
+    for value in ("cheap", 1.0, [1]):
+        with pytest.raises(InputError, match=r"fidelity = .*: give one of 'exact'"):
+            load_study({"scene": "fenz-test2", "axes": {"level": {"sets": "fidelity", "values": [value]}}})
+
+
 def test_of_regimes_with_one_slope_the_first_is_taken():
     """With upper bound friction two regimes of this stack differ in slope by rounding alone, in friction by 1.8."""
     stack = bearing("fenz-tfp")
