@@ -1,8 +1,8 @@
-"""The cheapest level: a mass on the published backbones of its bearings, in fixed steps of compiled code.
+"""The model `backbone`, the cheapest of an estimate: a scene becomes a mass on the backbone curves of its bearings.
 
-The backbone is one of elastic and plastic elements in parallel, which reverse as the stack does, until its slope rises
-for the first time; the regimes after that, in which rims carry, are springs beyond a gap. Force and load act in both
-directions.
+Compiled code takes fixed steps and returns the peaks; there is no history. Up to the displacement at which the
+published curve first stiffens, a bearing is a spring and elastic-plastic elements in parallel, which unload as the
+stack does. The regimes beyond, in which rims carry, are springs that act after a gap. Both horizontal directions count.
 """
 
 from __future__ import annotations
@@ -31,20 +31,19 @@ if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
     from msfp_gen.specification.layout import Auto, Effects
 
-STEP = 0.01  # [s], at most
-STABLE = 0.5  # largest circular frequency times step
-# Quantities of its runs, without the number of a surface.
-QUANTITIES = (
+STEP = 0.01  # largest step [s]
+STABLE = 0.5  # highest circular frequency times step, at most [-]
+QUANTITIES = (  # of a run, of the bearing or building as a whole
     "status", "message", "duration", "peak_displacement", "peak_force", "peak_force_ratio", "rims_met", "wall_time",
 )  # fmt: skip
-OF_SURFACES = ("peak_sliding", "minimum_gap", "capacity_used")  # of one bearing only
+OF_SURFACES = ("peak_sliding", "minimum_gap", "capacity_used")  # one value a surface; scenes of one bearing only
 
 
 @dataclass(frozen=True)
 class BackboneRun:
-    """A run of the cheapest level: its scene and the quantities of its summary; there are no rows.
+    """A run of the model `backbone`: its scene, status and summary; it has no history.
 
-    Sliding of surfaces is that of the published backbone at the largest displacement.
+    The sliding of each surface is taken from the published backbone at the peak displacement.
     """
 
     scene: AnyScene
@@ -53,16 +52,16 @@ class BackboneRun:
     summary: dict[str, Any]
 
     def storage(self) -> Any:
-        """Where the columns of a history are: a run without rows has none."""
+        """An empty history, with the interface of the storage of a result."""
         return SimpleNamespace(columns=lambda _: {}, arrays_of=lambda _: {})
 
     def characterise(self) -> Any:
-        """Raises InputError: there are no rows."""
+        """Raises InputError: without a history there is nothing to characterise."""
         raise InputError("fidelity = 'backbone': it keeps no history; give 'equivalent'")
 
 
 def run_backbone(scene: AnyScene) -> BackboneRun:
-    """Run a scene at the cheapest level. Raises InputError: what it is not for, as `check_backbone` says."""
+    """Run a scene as a mass on its backbone. Raises InputError: the scenes that `check_backbone` refuses."""
     begin = time.perf_counter()
     check_backbone(scene)
     if isinstance(scene, Scene):
@@ -71,7 +70,7 @@ def run_backbone(scene: AnyScene) -> BackboneRun:
         bearings, shares, mass = [_with_rims(scene.bearing, scene.effects)], [1.0], scene.top.mass
         motion = scene.motion
     else:
-        bearings = [_with_rims(one.bearing, one.effects) for one in scene.bearings]
+        bearings = [_with_rims(mounted.bearing, mounted.effects) for mounted in scene.bearings]
         shares, mass, stop = load_shares(scene), float(scene.axial_loads.sum()) / scene.gravity, 0.0
         motion = scene.first_ground
     elements, spring, gaps = _elements(tuple(bearings), tuple(shares), mass)
@@ -92,14 +91,14 @@ def run_backbone(scene: AnyScene) -> BackboneRun:
     }
     if isinstance(scene, Scene):
         sliding = _backbone(bearings[0], mass * gravity).sliding(peak)
-        gap = [surface.capacity - value for surface, value in zip(scene.bearing.surfaces, sliding, strict=True)]
-        met = [number for number, value in enumerate(gap, start=1) if value <= 1e-9]
-        summary |= {"peak_sliding": sliding, "minimum_gap": gap, "rims_met": met}
+        gaps_left = [surface.capacity - value for surface, value in zip(scene.bearing.surfaces, sliding, strict=True)]
+        rims_met = [number for number, gap in enumerate(gaps_left, start=1) if gap <= 1e-9]
+        summary |= {"peak_sliding": sliding, "minimum_gap": gaps_left, "rims_met": rims_met}
     return BackboneRun(scene, summary["status"], "", summary)
 
 
 def check_backbone(scene: AnyScene) -> None:
-    """Raise InputError where a scene is none of a mass on bearings that starts at rest."""
+    """Raise InputError unless the scene is a mass on bearings that starts at rest on a base that does not rotate."""
     if isinstance(scene, Scene):
         if not isinstance(scene.top, MassTop):
             raise InputError(
@@ -126,7 +125,7 @@ def check_backbone(scene: AnyScene) -> None:
 
 
 def _with_rims(bearing: Bearing, effects: Effects | Auto | None) -> Bearing:
-    """The bearing, with rims that carry nothing where the effects of its scene have none."""
+    """The bearing; its rims have no stiffness where the effects of the scene leave rims out."""
     return bearing.replace(rim_stiffness=0.0) if effects and effects.rims is False else bearing
 
 
@@ -136,43 +135,50 @@ def _backbone(bearing: Bearing, load: float) -> Backbone:
 
 
 def _elements(bearings: tuple[Bearing, ...], shares: tuple[float, ...], mass: float) -> tuple[Array, float, Array]:
-    """Elements (stiffness, strength), spring, and gaps (displacement, stiffness) of bearings side by side."""
-    alike: dict[Bearing, list[float]] = {}
+    """Elements, spring and gaps of all bearings in parallel, as of `parallel`, over the load of all.
+
+    shares: of each bearing in the load. Equal bearings become one, at their mean load.
+    """
+    shares_of: dict[Bearing, list[float]] = {}
     for bearing, share in zip(bearings, shares, strict=True):
-        alike.setdefault(bearing, []).append(share)
+        shares_of.setdefault(bearing, []).append(share)
     weight = mass * bearings[0].gravity
-    parts = [(sum(own), *parallel(_backbone(bearing, weight * float(np.mean(own))))) for bearing, own in alike.items()]
-    elements = np.concatenate([rows * share for share, rows, _, _ in parts], axis=1)
-    gaps = np.concatenate([rows * [[1.0], [share]] for share, _, _, rows in parts], axis=1)
+    kinds = [
+        (sum(loads), *parallel(_backbone(bearing, weight * float(np.mean(loads)))))
+        for bearing, loads in shares_of.items()
+    ]
+    elements = np.concatenate([own * share for share, own, _, _ in kinds], axis=1)
+    gaps = np.concatenate([own * [[1.0], [share]] for share, _, _, own in kinds], axis=1)
     limit = _driver().MOST
     if elements.shape[1] > limit:
         raise InputError(f"bearings: {elements.shape[1]} regimes of different bearings; the backbone takes {limit}")
-    return elements, float(sum(share * spring for share, _, spring, _ in parts)), gaps
+    return elements, float(sum(share * spring for share, _, spring, _ in kinds)), gaps
 
 
 def parallel(backbone: Backbone) -> tuple[Array, float, Array]:
-    """Elements (stiffness [1/m], strength), shape (2, k), spring [1/m], and gaps (displacement [m], stiffness [1/m]).
+    """A backbone curve as elements and a spring in parallel, and springs after gaps; forces are over the load.
 
-    Each element yields where the slope falls, until it rises for the first time. Stiffness and strength are over the
-    load. The last gap is that at which all sliders press on their rims.
+    Elements: stiffness [1/m] and strength [-], shape (2, k); an element yields at each displacement where the slope of
+    the curve falls, before the slope rises for the first time. Spring: stiffness [1/m]. Gaps: displacement [m] and
+    stiffness [1/m], shape (2, g); after the last gap all sliders press on their rims.
     """
     u, force = backbone.points
     slopes = np.diff(force) / np.diff(u)
     rising = np.append(np.diff(slopes) > slopes[:-1] * EQUAL, True)
-    main = int(np.flatnonzero(rising)[0])
-    stiffness = -np.diff(slopes[: main + 1])
-    yields = u[1 : main + 1]
+    last = int(np.flatnonzero(rising)[0])  # regime before the slope rises
+    stiffness = -np.diff(slopes[: last + 1])
+    yields = u[1 : last + 1]
     falling = stiffness > 0
-    gaps = np.array([u[main + 1 :], np.diff([*slopes[main:], backbone.last_slope])])
-    return np.array([stiffness, stiffness * yields])[:, falling], float(slopes[main]), gaps
+    gaps = np.array([u[last + 1 :], np.diff([*slopes[last:], backbone.last_slope])])
+    return np.array([stiffness, stiffness * yields])[:, falling], float(slopes[last]), gaps
 
 
 def _ground(motion: Motion, end: float, step: float) -> Array:
-    """Accelerations of the ground at the beginning of every step [m/s^2], shape (steps, 3)."""
+    """Acceleration of the ground at the beginning of every step, shape (steps, 3) [m/s^2]."""
     times = np.arange(0.0, end, step)
     if not motion.sampled:
         return np.ascontiguousarray(motion.evaluate(times, 2)[:, :3])
-    at_knots = 2 * motion.coefficients[:, :3, 2]  # linear between samples
+    at_knots = 2 * motion.coefficients[:, :3, 2]  # the acceleration of a record is linear between its samples
     return np.stack([np.interp(times, motion.knots[:-1], channel) for channel in at_knots.T], axis=1)
 
 

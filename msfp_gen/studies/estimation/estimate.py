@@ -1,6 +1,7 @@
-"""`estimate`: a mean, variance, probability, quantile or fragility of a study from cheap and exact runs together.
+"""`estimate`: a mean, variance, probability, quantile or fragility of a study from cheap and exact runs.
 
-An estimate for a terminal, and its picture: width of the interval over time, plain Monte Carlo beside it.
+A study and a question come in; rounds of runs (`source.py`) are planned until the interval (`estimators.py`) is narrow
+enough; an `Estimate` goes out. Its table for a terminal and its figure are here too.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from msfp_gen.studies.estimation.estimators import (
     Indices,
     Moment,
     Runs,
-    bent,
     best_chain,
+    curve,
     exceedance,
     exceeding,
     factor_for,
@@ -51,33 +52,33 @@ STATISTICS = {
     "mean": "the mean",
     "variance": "the variance",
     "probability": "the probability that the quantity is at least `threshold`",
-    "quantile": "the value below which the share `threshold` of all lies",
+    "quantile": "the value below which the share `threshold` of all draws lies",
     "fragility": "the median scale or intensity at which the quantity reaches `threshold`, and its dispersion",
 }
-LEVELS = {"backbone": 1, "equivalent": 2, "rigid": 3, "massless": 3, "loose": 3}  # cheaper models, cheapest first
-ENOUGH = 0.25  # work of a chain over that of plain Monte Carlo below which dearer models are not tried
-NO_BENEFIT = 0.8  # and above which the study is run plainly
+LEVELS = {"backbone": 1, "equivalent": 2, "rigid": 3, "massless": 3, "loose": 3}  # cheaper model -> rank, cheapest 1
+ENOUGH = 0.25  # work of a chain over plain Monte Carlo below which no dearer model is tried
+NO_BENEFIT = 0.8  # work of a chain over plain Monte Carlo above which only exact runs are made
 ROUNDS = 8
-GROWTH = 3.0  # of the exact runs from one round to the next, at most
-MARGIN = 0.9  # of the half width that the runs are planned for, over the target
+GROWTH = 3.0  # exact runs of a round over the exact runs of the round before, at most
+MARGIN = 0.9  # half width that the runs are planned for, over the target
 MOST = 200_000  # draws
-MORE = 1.2  # exact runs planned for one more round, over those planned before, at least
-CHOSEN = 1.5  # exact runs at least, over those of the pilot
-LEAST_SHARE = 0.2  # time of the cheapest runs, over that of the others, at least: so a rare event is seen by them
-EQUAL = 0.25  # of the exact runs after the pilot: chosen with equal chances, whatever the prediction says
-CHEAP = 8  # cheap runs for each exact one in the pilot
+MORE = 1.2  # exact runs planned for a round, over the number planned for the round before, at least
+CHOSEN = 1.5  # exact runs over the exact runs of the pilot, at least
+LEAST_SHARE = 0.2  # time of the cheapest runs over the time of all others, at least: so rare events occur among them
+EQUAL = 0.25  # share of the exact runs after the pilot that is chosen with equal chances, whatever the prediction
+CHEAP = 8  # runs of the cheapest model for each exact run in the pilot
 WIDTH, HEIGHT = 6.8, 4.6  # of the figure [inch]
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is estimated, and how well: `[accuracy]` of a study file.
+    """What is estimated, and how accurately: the table `[accuracy]` of a study file.
 
     quantity: a column of the study. statistic: a key of STATISTICS. threshold: of a probability or a fragility [unit of
-    the quantity], or the share of a quantile. target: half the width of the interval of 95 % over the value, for a
-    probability the half width itself. budget: of all runs together, over all workers [s]. pilot: exact runs at the
-    start. models: cheaper models; None: chosen. seed: of the draws. logarithmic: whether the values are logarithms,
-    whose half width is relative already. Raises InputError.
+    the quantity], or the share of a quantile [-]. target: half the width of the interval of 95 %, over the value; for a
+    probability not over the value. budget: core time of all runs [s]. pilot: exact runs at the start. models: cheaper
+    models to try; None: `estimate` chooses them. seed: of the draws. logarithmic: whether the values are logarithms,
+    for which the target is not over the value. Raises InputError.
     """
 
     quantity: str | None = None
@@ -92,12 +93,14 @@ class Question:
 
     def __post_init__(self) -> None:
         check_fields(self, "accuracy")
-        needs = self.statistic in ("probability", "quantile", "fragility")
-        if needs != (self.threshold is not None):
-            rule = "give it" if needs else "leave it out"
+        needs_threshold = self.statistic in ("probability", "quantile", "fragility")
+        if needs_threshold != (self.threshold is not None):
+            rule = "give it" if needs_threshold else "leave it out"
             raise InputError(f"accuracy.threshold = {self.threshold}: {rule} with statistic = {self.statistic!r}")
-        if self.statistic == "quantile" and not 0 < self.level < 1:
-            raise InputError(f"accuracy.threshold = {self.level:g}: give the share of a quantile, between 0 and 1")
+        if self.statistic == "quantile" and not 0 < self.given_threshold < 1:
+            raise InputError(
+                f"accuracy.threshold = {self.given_threshold:g}: give the share of a quantile, between 0 and 1"
+            )
         if self.target is None and self.budget is None:
             raise InputError("accuracy: give target, such as '2 %', or budget, such as '10 min'")
         for name in self.models or ():
@@ -105,18 +108,18 @@ class Question:
                 raise InputError(f"accuracy.models has {name!r}: give some of {', '.join(map(repr, LEVELS))}")
 
     @property
-    def of_share(self) -> bool:
-        """Whether the statistic follows from probabilities."""
+    def needs_probability(self) -> bool:
+        """Whether the statistic is computed from probabilities of exceedance."""
         return self.statistic in ("probability", "quantile")
 
     @property
-    def level(self) -> float:
-        """The threshold, of a statistic that has one."""
+    def given_threshold(self) -> float:
+        """The threshold, for a statistic that has one."""
         assert self.threshold is not None
         return self.threshold
 
-    def half(self, value: float) -> float:
-        """The half width that is asked for, in the unit of the value."""
+    def target_half(self, value: float) -> float:
+        """The target for half the width of the interval about an estimate [unit of `value`]."""
         assert self.target is not None
         absolute = self.statistic == "probability" or self.logarithmic
         return self.target if absolute else self.target * abs(value)
@@ -127,16 +130,17 @@ class Estimate:
     """Result of `estimate`.
 
     Attributes:
-        quantity, statistic, threshold, unit: what was estimated; of a fragility the unit of its intensity.
+        quantity, statistic, threshold: as in `Question`.
+        unit: of `value`; for a fragility the unit of the intensity.
         value: the estimate.
-        interval: (low, high), of 95 %.
+        interval: (low, high), of 95 % [unit of `value`].
         runs: model -> number of its runs.
-        seconds: of all runs, on one core [s].
-        plain_seconds: what plain Monte Carlo needs for this interval, from the variance and the cost of exact runs [s].
-        correlation: model -> that with the exact one, at the same draws.
-        costs: model -> seconds of a run [s].
-        dispersion, dispersion_interval: of a fragility, standard deviation of the logarithm; else None.
-        trace: pairs of seconds and half width, after each round.
+        seconds: core time of all runs [s].
+        plain_seconds: core time of plain Monte Carlo for this interval, from variance and cost of exact runs [s].
+        correlation: cheaper model -> correlation with the exact model, over the draws of the pilot [-].
+        costs: model -> core time of a run [s].
+        dispersion, dispersion_interval: for a fragility, standard deviation of the logarithm [-]; else None.
+        trace: (seconds, half width) after each round.
         notes: what a reader must know, one line each.
     """
 
@@ -158,16 +162,21 @@ class Estimate:
 
     @property
     def half(self) -> float:
-        """Half the width of the interval."""
-        return (self.interval[1] - self.interval[0]) / 2
+        """Half the width of the interval [unit of `value`]."""
+        return half_of(self.interval)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON."""
         return asdict(self)
 
 
+def half_of(interval: tuple[float, float]) -> float:
+    """Half the width of an interval (low, high) [its unit]."""
+    return (interval[1] - interval[0]) / 2
+
+
 def question_of(study: Study, **changes: Any) -> Question:
-    """The question of `[accuracy]` in a study file, with what is given in place of it. Raises InputError."""
+    """The question of `[accuracy]` in a study file; changes other than None replace its keys. Raises InputError."""
     table = {key: value for key, value in study.table.get("accuracy", {}).items() if key != "listed"}
     known = [name for name in Question.__dataclass_fields__ if name != "logarithmic"]
     if unknown := [key for key in table if key not in known]:
@@ -214,15 +223,15 @@ def estimate(
 ) -> Estimate:
     """Estimate a statistic of a quantity over the draws of a study, with few exact runs.
 
-    A draw is a combination of the values of the axes, each as likely as any other, with a value of each random axis.
-    Exact runs are kept in `folder` as those of any study, runs of cheaper models in folders within it; the same call
-    continues. What is not given is that of `[accuracy]` in the study file.
+    A draw is a combination of the values of the gridded axes, all equally likely, and one value of each random axis.
+    The folder is the folder of a study with the exact runs; the runs of each cheaper model are a study in a folder
+    within it. The same call continues an interrupted estimate.
 
     source, workers, threads, executor, dask, mpi: as of `study`. folder: of the study. quantity to seed: as in
-    `Question`; target and budget also as texts, such as "2 %" and "10 min". progress: called with the name of a model
-    and the number of its runs, before these.
+    `Question`, by default the keys of `[accuracy]` in the study file; target and budget also as texts, such as "2 %"
+    and "10 min". progress: called with the name of a model and a number of draws before the runs of these draws.
 
-    Raises InputError: invalid input, or a target that the budget does not permit, as the pilot shows: a new folder is
+    Raises InputError: invalid input, or the pilot shows that the budget does not permit the target, and a new folder is
     removed again; RunError: workers died; the same call continues.
     """
     study = source if isinstance(source, Study) else load_study(source)
@@ -234,7 +243,7 @@ def estimate(
     levels = (EXACT, *(cheaper if question.models is None else question.models))
     assert question.quantity is not None
     scales, unit = _scales(study, question)
-    begun = Path(folder).exists()
+    existed = Path(folder).exists()
     try:
         with pool_from(workers, threads, executor, dask, mpi) as pool:
             runs = StudySource(study, Path(folder), question.quantity, levels, question.seed, pool, progress)
@@ -245,14 +254,14 @@ def estimate(
                 unit = {column.name: column.unit for column in study.keep.columns}[question.quantity]
                 unit = {"probability": "", "variance": f"({unit})^2" if unit else ""}.get(question.statistic, unit)
     except _BudgetError:
-        if not begun:
+        if not existed:
             rmtree(folder, ignore_errors=True)
         raise
     return replace(result, unit=unit)
 
 
 def _scales(study: Study, question: Question) -> tuple[Array | None, str]:
-    """The scales of a study whose fragility is asked for, and the unit of its intensity; None for other statistics."""
+    """For a fragility the scales of the study, shape (k,) [-], and the unit of the intensity; else None and no unit."""
     if question.statistic != "fragility":
         return None, ""
     axis = next((axis for axis in study.axes if axis.name == "scale"), None)
@@ -265,7 +274,21 @@ def _scales(study: Study, question: Question) -> tuple[Array | None, str]:
 
 
 class _State:
-    """Runs of the models of a chain so far, and the chances with which exact ones are chosen."""
+    """The chain of models of an estimate, its runs so far, and the chances with which draws are chosen.
+
+    The last level of the chain runs the first `count` draws. Every dearer level runs the draws of the pilot, and
+    after these the draws that are chosen, with chance scale * weight + equal.
+
+    Attributes:
+        pilot: draws that every level runs.
+        chain: models, the exact model first.
+        count: draws of the last level.
+        scale, equal: level -> factor of the weights, and chance that every draw has, both [-].
+        planned: exact runs that the last plan asked for.
+        early: model -> runs that ended early.
+        weights: function of the values of the last level, as of `uncertainty`; None before the first use.
+        uniform: of every draw, a random number that decides whether a level with a given chance runs it, shape (MOST,).
+    """
 
     def __init__(self, source: Source, question: Question) -> None:
         self.source, self.question = source, question
@@ -274,17 +297,20 @@ class _State:
         self.count = self.pilot
         self.scale: dict[str, float] = {}
         self.equal: dict[str, float] = {}
-        self.planned = 0.0  # exact runs
+        self.planned = 0.0
         self.early: dict[str, int] = {}
         self.weights: Any = None
         self.uniform = np.random.default_rng([question.seed, 2**31]).random(MOST)
 
-    def outcome(self, level: str, draws: Indices) -> Array:
-        """The values of a model as the statistic takes them."""
+    def outcomes(self, level: str, draws: Indices) -> Array:
+        """The values of a model at draws, shape (draws,) [unit of the quantity].
+
+        For a probability or a quantile, a run that ended early is infinite unless it exceeded the threshold before.
+        """
         values, early = self.source.values(level, draws)
         self.early[level] = int(early.sum())
-        if self.question.of_share:
-            bound = self.question.level if self.question.statistic == "probability" else np.inf
+        if self.question.needs_probability:
+            bound = self.question.given_threshold if self.question.statistic == "probability" else np.inf
             return np.where(early & (values < bound), np.inf, values)
         if level == EXACT and np.isinf(values).any():
             raise InputError(
@@ -294,75 +320,77 @@ class _State:
         return values
 
     def levels(self) -> list[Runs]:
-        """The runs of every model of the chain, computed where they are missing."""
+        """The runs of every level of the chain, exact first; missing runs are computed."""
         draws = np.arange(self.count)
-        last = Runs(draws, self.outcome(self.chain[-1], draws), np.ones(self.count))
+        last = Runs(draws, self.outcomes(self.chain[-1], draws), np.ones(self.count))
         if len(self.chain) == 1:
             return [last]
         if self.weights is None:
-            exact = self.outcome(EXACT, draws[: self.pilot])
+            exact = self.outcomes(EXACT, draws[: self.pilot])
             x = feature(last.values)[: self.pilot]
-            self.weights = partial(uncertainty, x, exact, self.bound(exact) if self.question.of_share else None)
+            bound = self.bound(exact) if self.question.needs_probability else None
+            self.weights = partial(uncertainty, x, exact, bound)
         weights = self.weights(feature(last.values))
-        chosen, least = [], np.zeros(self.count)
+        dearer, least = [], np.zeros(self.count)
         for level in self.chain[:-1]:
             own = self.scale.get(level, 0.0) * weights + self.equal.get(level, 0.0)
-            least = np.maximum(least, np.minimum(own, 1.0))
+            least = np.maximum(least, np.minimum(own, 1.0))  # a level also runs every draw of the level before it
             chances = np.where(draws < self.pilot, 1.0, least)
-            here = draws[self.uniform[: self.count] < chances]
-            chosen.append(Runs(here, self.outcome(level, here), chances[here]))
-        return [*chosen, last]
+            chosen = draws[self.uniform[: self.count] < chances]
+            dearer.append(Runs(chosen, self.outcomes(level, chosen), chances[chosen]))
+        return [*dearer, last]
 
     def bound(self, exact: Array) -> float:
-        """The threshold of a probability, or the quantile of the pilot."""
+        """The threshold of a probability; for a quantile, the quantile of the exact runs of the pilot."""
         if self.question.statistic == "probability":
-            return self.question.level
-        return float(np.quantile(feature(exact), self.question.level))
+            return self.question.given_threshold
+        return float(np.quantile(feature(exact), self.question.given_threshold))
 
-    def grow(self, wanted: Array) -> None:
-        """Plan for these numbers of runs of every model, exact first."""
+    def plan(self, wanted: Array) -> None:
+        """Set draws and chances for these numbers of runs of every level, exact first, shape (levels,)."""
         limit = min(MOST, self.source.population or MOST)
         if len(self.chain) == 1:
             self.count = min(max(int(np.ceil(wanted[0])), self.count), limit)
             return
         self.count = min(max(int(np.ceil(wanted[-1] / 64)) * 64, self.count), limit)
-        values = feature(self.outcome(self.chain[-1], np.arange(self.count)))
+        values = feature(self.outcomes(self.chain[-1], np.arange(self.count)))
         weights = self.weights(values)[self.pilot :]
         self.planned = float(wanted[0])
         for level, number in zip(self.chain[:-1], wanted[:-1], strict=True):
-            more = max(float(number) - self.pilot, 0.0)
-            equal = EQUAL * more / max(len(weights), 1)
+            beyond_pilot = max(float(number) - self.pilot, 0.0)
+            equal = EQUAL * beyond_pilot / max(len(weights), 1)
             self.equal[level] = max(self.equal.get(level, 0.0), min(equal, 1.0))
-            self.scale[level] = max(self.scale.get(level, 0.0), factor_for(weights, more, equal))
+            self.scale[level] = max(self.scale.get(level, 0.0), factor_for(weights, beyond_pilot, equal))
 
 
 def estimated(source: Source, question: Question) -> Estimate:
-    """The estimate of a statistic from a source of runs. Raises InputError."""
-    return _estimated(source, question)[0]
+    """The estimate of a statistic other than a fragility from a source of runs. Raises InputError."""
+    return _estimate_and_runs(source, question)[0]
 
 
-def _estimated(source: Source, question: Question) -> tuple[Estimate, list[Runs], int]:
-    """The estimate, the runs that it is of, and the number of draws in the pilot."""
+def _estimate_and_runs(source: Source, question: Question) -> tuple[Estimate, list[Runs], int]:
+    """The estimate, the runs of every level from which it is computed, and the number of draws in the pilot."""
     state, notes = _State(source, question), []
-    correlation = _pilot(state)
+    correlation = _run_pilot(state)
     if len(state.chain) == 1:
         notes.append("no cheaper model saves time here (correlation too low, or too dear): exact runs only")
     trace: list[tuple[float, float]] = []
     for _ in range(ROUNDS):
         levels = state.levels()
         answer = _answer(question, levels, state.pilot, source.population)
+        half = half_of(answer.interval)
         spent, runs = source.spent()
-        trace.append((spent, answer.half))
-        if not _more(state, answer, spent, len(levels[0].draws)):
+        trace.append((spent, half))
+        if not _plan_round(state, answer, spent, len(levels[0].draws)):
             break
-    value, half = answer.value, answer.half
+    value = answer.value
     costs = {level: source.cost(level) for level in runs}
-    if question.target is not None and half > 1.02 * question.half(value):
+    if question.target is not None and half > 1.02 * question.target_half(value):
         notes.append(f"the target was not reached: the half width is {half:.3g}")
     if question.budget is not None and spent > 1.1 * question.budget:
         notes.append(f"the runs took {spent:.3g} s in place of {question.budget:g} s: a pilot needs that; give fewer")
     for level, count in state.early.items():
-        if count and question.of_share:
+        if count and question.needs_probability:
             notes.append(f"{count} runs of {level} ended early; they count as above every value")
         elif count:
             word = "a lower bound" if level == EXACT else "what they reached"
@@ -376,23 +404,23 @@ def _estimated(source: Source, question: Question) -> tuple[Estimate, list[Runs]
     return estimate, levels, state.pilot
 
 
-def _pilot(state: _State) -> dict[str, float]:
-    """Run the pilot of each model and choose the chain; correlations by model.
+def _run_pilot(state: _State) -> dict[str, float]:
+    """Run the pilot of the models and choose the chain; returns cheaper model -> correlation with the exact model.
 
-    The cheapest model comes first: a search for a crossing begins where it crosses.
+    The cheapest model runs first, since the search for a crossing by the exact model begins at its crossing.
     """
     draws, source = np.arange(state.pilot), state.source
     cheaper = sorted(source.levels[1:], key=lambda name: LEVELS.get(name, 9))
     for level in cheaper[:1]:
-        state.outcome(level, draws)
-    exact = state.outcome(EXACT, draws)
+        state.outcomes(level, draws)
+    exact = state.outcomes(EXACT, draws)
     correlation, costs = {EXACT: 1.0}, {EXACT: source.cost(EXACT)}
     best = best_chain(correlation, costs)
     for level in cheaper:
         if best.work < ENOUGH and state.question.models is None:
             break
         many = np.arange(min(CHEAP * state.pilot, source.population or MOST)) if LEVELS.get(level) == 1 else draws
-        x = feature(state.outcome(level, many))[: state.pilot]
+        x = feature(state.outcomes(level, many))[: state.pilot]
         costs[level] = source.cost(level)
         correlation[level] = _correlation(state, exact, x)
         best = best_chain(correlation, costs)
@@ -404,73 +432,73 @@ def _pilot(state: _State) -> dict[str, float]:
 
 
 def _correlation(state: _State, exact: Array, x: Array) -> float:
-    """That of the target of the statistic with its prediction; of the values where the pilot has yes or no only."""
+    """The correlation of the exact values of the pilot, shape (pilot,), with their prediction from a cheaper model.
+
+    For a probability or a quantile it is the correlation of the exceedances, unless fewer than two runs of the pilot
+    exceed the threshold or fewer than two stay below it. x: values of the cheaper model, shape (pilot,).
+    """
     target, draws = exact, np.arange(len(exact))
-    if state.question.of_share:
+    if state.question.needs_probability:
         target = feature(exact)
-        indicator = (exact >= state.bound(exact)).astype(float)
-        if 2 <= indicator.sum() <= len(indicator) - 2:
+        exceeds = (exact >= state.bound(exact)).astype(float)
+        if 2 <= exceeds.sum() <= len(exceeds) - 2:
             predicted = predictions(exceedance(state.bound(exact)), draws, x, draws, exact)
-            return _linear(indicator, predicted)
-    return _linear(target, predictions(bent, draws, x, draws, target))
+            return _positive_correlation(exceeds, predicted)
+    return _positive_correlation(target, predictions(curve, draws, x, draws, target))
 
 
-def _linear(one: Array, other: Array) -> float:
-    """The correlation of two arrays, 0 where one does not vary or they are opposed."""
-    if not (np.std(one) > 0 and np.std(other) > 0):
+def _positive_correlation(first: Array, second: Array) -> float:
+    """The correlation of two arrays; 0 where it is negative or one array does not vary."""
+    if not (np.std(first) > 0 and np.std(second) > 0):
         return 0.0
-    return max(float(np.corrcoef(one, other)[0, 1]), 0.0)
+    return max(float(np.corrcoef(first, second)[0, 1]), 0.0)
 
 
 class _Answer(NamedTuple):
-    """Value, interval, and the moment from which the runs are planned."""
+    """The value of a statistic, its interval, and the moment from which the next runs are planned."""
 
     value: float
     interval: tuple[float, float]
     moment: Moment
 
-    @property
-    def half(self) -> float:
-        return (self.interval[1] - self.interval[0]) / 2
-
 
 def _answer(question: Question, levels: list[Runs], pilot: int, population: int | None) -> _Answer:
     if question.statistic == "quantile":
-        return _Answer(*quantile_of(levels, question.level, pilot, population))
+        return _Answer(*quantile_of(levels, question.given_threshold, pilot, population))
     if question.statistic == "probability":
-        moment = exceeding(levels, question.level, pilot, population)
+        moment = exceeding(levels, question.given_threshold, pilot, population)
         value, low, high = np.clip(moment.value + moment.half * np.array([0, -1, 1]), 0.0, 1.0).tolist()
         return _Answer(value, (low, high), moment)
     if question.statistic == "variance":
         moment = variance_of(levels, pilot, population)
-        share = float(np.exp(moment.half / moment.value)) if moment.value > 0 else np.inf
-        return _Answer(moment.value, (moment.value / share, moment.value * share), moment)
+        ratio = float(np.exp(moment.half / moment.value)) if moment.value > 0 else np.inf
+        return _Answer(moment.value, (moment.value / ratio, moment.value * ratio), moment)
     moment = telescoped(levels[0].values, levels, pilot, population)
     return _Answer(moment.value, (moment.value - moment.half, moment.value + moment.half), moment)
 
 
 class _BudgetError(InputError):
-    """A target that the pilot shows to need more than the budget."""
+    """The pilot shows that the target needs more time than the budget."""
 
 
-def _more(state: _State, answer: _Answer, spent: float, exact: int) -> bool:
-    """Plan the next round; whether there is one. spent: seconds so far. exact: number of exact runs.
+def _plan_round(state: _State, answer: _Answer, spent: float, exact: int) -> bool:
+    """Plan the next round, and return whether there is one. spent: core time so far [s]. exact: number of exact runs.
 
-    Raises _BudgetError where the pilot alone shows that the budget does not permit the target; later the estimate ends
-    with the budget, and a note says so.
+    Raises _BudgetError where the pilot alone shows that the budget does not permit the target. After the pilot the
+    estimate ends with the budget, and a note says so.
     """
-    question, moment, half = state.question, answer.moment, answer.half
+    question, moment, half = state.question, answer.moment, half_of(answer.interval)
     costs = np.array([state.source.cost(level) for level in state.chain])
     variances = np.maximum(moment.variances, 1e-12 * max(answer.value**2, 1e-300))
     if question.target is not None:
-        wanted = question.half(answer.value)
-        checked = len(state.chain) == 1 or state.scale[EXACT] > 0 or exact >= state.count
-        if half <= wanted and checked:
+        target_half = question.target_half(answer.value)
+        beyond_pilot = len(state.chain) == 1 or state.scale[EXACT] > 0 or exact >= state.count
+        if half <= target_half and beyond_pilot:
             return False
-        planned = moment.variance * (MARGIN * wanted / max(half, 1e-300)) ** 2
+        planned = moment.variance * (MARGIN * target_half / max(half, 1e-300)) ** 2
         runs = optimal_runs(variances, costs, variance=planned)
-        if moment.unseen:  # its variance falls with the square of the exact runs
-            runs *= min(1.0, exact * half / (MARGIN * wanted) / runs[0])
+        if moment.unseen:  # such a variance falls with the square of the number of exact runs
+            runs *= min(1.0, exact * half / (MARGIN * target_half) / runs[0])
         needed = float(runs @ costs)
         if question.budget is not None and needed > question.budget and exact <= state.pilot:
             raise _BudgetError(
@@ -483,24 +511,24 @@ def _more(state: _State, answer: _Answer, spent: float, exact: int) -> bool:
         if spent > 0.95 * question.budget:
             return False
         runs = optimal_runs(variances, costs, seconds=question.budget)
-    if len(state.chain) > 1:  # the pilot may lack draws of a kind that the cheap model knows: some more are chosen
+    if len(state.chain) > 1:  # uncertain draws may be missing from the pilot: some are always chosen
         runs[0] = max(runs[0], CHOSEN * state.pilot)
-        if question.target is not None:  # chance may have chosen fewer than were planned
+        if question.target is not None:  # chance may have chosen fewer draws than planned
             runs[0] = max(runs[0], MORE * state.planned)
     before = (state.count, dict(state.scale))
     runs *= min(1.0, GROWTH * exact / runs[0])
     runs[-1] = max(runs[-1], LEAST_SHARE * float(runs[:-1] @ costs[:-1]) / costs[-1])
-    state.grow(runs)
+    state.plan(runs)
     return before != (state.count, state.scale)
 
 
 def _plain_variance(question: Question, levels: list[Runs], answer: _Answer) -> float:
-    """The variance of one plain draw, in the unit of the estimate."""
+    """The variance that plain Monte Carlo divides by its number of runs [squared unit of the estimate]."""
     if question.statistic == "probability":
         return max(answer.value * (1 - answer.value), 1e-12)
     if question.statistic == "quantile":
-        slope = answer.half / max(answer.moment.half, 1e-300)
-        return question.level * (1 - question.level) * slope**2
+        slope = half_of(answer.interval) / max(answer.moment.half, 1e-300)
+        return question.given_threshold * (1 - question.given_threshold) * slope**2
     values, weights = levels[0].values, 1 / levels[0].chances
     mean = float(np.average(values, weights=weights))
     squares = (values - mean) ** 2
@@ -510,20 +538,21 @@ def _plain_variance(question: Question, levels: list[Runs], answer: _Answer) -> 
 
 
 def fragility_of(source: Source, question: Question, scales: Array, intensity: Callable[[Indices], Array]) -> Estimate:
-    """The fragility of a threshold: median and dispersion of the intensity at which a draw reaches it.
+    """The fragility of a threshold: median and dispersion of the intensity at which the quantity of a draw reaches it.
 
-    intensity: logarithm of the intensity of draws at scale 1. The runs of a draw close in on its crossing; those of the
-    exact model begin where the cheapest one crosses.
+    scales: of the study, rising, shape (k,) [-]. intensity: draws -> logarithm of their intensity at scale 1. It is the
+    exponential of a mean, and a variance, of the logarithms that `Searches` finds.
     """
-    searches = Searches(source, question.level, scales, intensity)
-    mean, levels, pilot = _estimated(searches, replace(question, statistic="mean", threshold=None, logarithmic=True))
+    searches = Searches(source, question.given_threshold, scales, intensity)
+    of_logarithms = replace(question, statistic="mean", threshold=None, logarithmic=True)
+    mean, levels, pilot = _estimate_and_runs(searches, of_logarithms)
     spread = variance_of(levels, pilot, source.population)
     notes = list(mean.notes)
     if searches.beyond:
         notes.append(f"{searches.beyond} draws cross outside records.scales; they count half a step beyond: give more")
     _, runs = source.spent()
     costs = {level: source.cost(level) for level in runs}
-    plain = mean.plain_seconds * costs[EXACT] * len(scales) / searches.cost(EXACT)  # which runs every scale
+    plain = mean.plain_seconds * costs[EXACT] * len(scales) / searches.cost(EXACT)  # plain Monte Carlo runs all scales
     dispersions = [float(np.sqrt(max(spread.value + sign * spread.half, 0.0))) for sign in (-1, 0, 1)]
     return replace(
         mean, statistic="fragility", threshold=question.threshold, value=float(np.exp(mean.value)),
@@ -534,7 +563,7 @@ def fragility_of(source: Source, question: Question, scales: Array, intensity: C
 
 
 def estimate_table(result: Estimate) -> Table:
-    """The estimate in ten lines at most."""
+    """The estimate as a table for a terminal, ten lines at most."""
     unit = f" {result.unit}" if result.unit else ""
     threshold = "" if result.threshold is None else f" {result.threshold:g}"
     runs = ", ".join(f"{count} {name}" for name, count in result.runs.items())
@@ -557,7 +586,7 @@ def estimate_table(result: Estimate) -> Table:
 
 
 def plot_estimate(result: Estimate, path: str | Path | None = None, title: str = "") -> Figure:
-    """Half the width of the interval over seconds: the mixture as it was, and plain Monte Carlo. path: as of `page`."""
+    """Half the width of the interval over core time, round by round, beside plain Monte Carlo. path: as of `page`."""
     seconds, half = np.array(result.trace).T
     with page(WIDTH, HEIGHT, path) as figure:
         headline(figure, title or f"{result.statistic} of {labelled(result.quantity, '')}: what an interval costs")

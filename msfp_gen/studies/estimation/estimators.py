@@ -1,15 +1,18 @@
-"""Estimates of a mean, a variance, a probability or a quantile from runs of several models on the same random draws.
+"""The mathematics of an estimate: a mean, variance, probability or quantile from runs of several models on equal draws.
 
-The estimate is a telescoping sum: the mean of the cheapest model's prediction over very many draws, and for every
-dearer model the mean difference from that prediction over fewer of them (approximate control variates: Gorodetsky,
-Geraci, Eldred and Jakeman, *Journal of Computational Physics* 408 (2020), 109257). A prediction is a line through the
-pairs of runs, for a probability the normal law about it. That of a draw is fitted to other draws only, so that no run
-is used twice and the estimate has no bias. Exact runs are chosen among the draws with known chances, larger where the
-prediction is unsure.
+Arrays come in and numbers go out; `estimate.py` decides which runs are made. The models form a chain: the exact model
+first, then cheaper models by falling correlation with it. Each model of a chain is a level.
 
-How many runs each model gets is the closed form of multi-fidelity Monte Carlo: Peherstorfer, Willcox and Gunzburger,
+The estimate is a telescoping sum (approximate control variates: Gorodetsky, Geraci, Eldred and Jakeman, *Journal of
+Computational Physics* 408 (2020), 109257). Its last term is the mean of the cheapest model over very many draws. Every
+other level adds the mean difference between its values and the prediction from the next cheaper level, over fewer
+draws. A prediction is a regression on pairs of runs of the same draw; for a probability it is a normal law about a
+regression line. The prediction for a draw is fitted to other draws only, so that the estimate has no bias. Draws for
+exact runs are chosen with known chances, which are larger where the prediction is uncertain.
+
+The number of runs of each level is the closed form of multi-fidelity Monte Carlo: Peherstorfer, Willcox and Gunzburger,
 "Optimal model management for multifidelity Monte Carlo estimation", *SIAM Journal on Scientific Computing* 38 (2016),
-A3163-A3194. Models are ordered from the exact one by falling correlation with it.
+A3163-A3194.
 """
 
 from __future__ import annotations
@@ -25,11 +28,12 @@ from msfp_gen.common.arrays import Array
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
-Fit = Callable[[Array, Array, Array], Callable[[Array], Array]]  # of x, y and the weights of these runs
+Function = Callable[[Array], Array]  # of x, elementwise
+Fit = Callable[[Array, Array, Array], Function]  # (x, y, weights of the runs) -> prediction of y
 EXACT = "exact"
-FOLDS = 5  # of the draws: a prediction is fitted to those of the other folds
-LEVEL = 0.95
-LEAST = 0.25  # chance of a draw for a mean, over the mean chance
+FOLDS = 5  # groups of draws: the prediction for a draw is fitted to the other groups
+CONFIDENCE = 0.95
+LEAST = 0.25  # smallest weight of a draw, over the mean weight, for a mean
 PRIOR = 1e-3  # weight of the prior of the slopes of a line, in runs
 RIDGE = 0.05  # weight of the prior of the slope of a logistic curve, in runs
 NORMAL = 1.702  # slope of the logistic curve that is nearest to the normal law
@@ -39,8 +43,9 @@ NORMAL = 1.702  # slope of the logistic curve that is nearest to the normal law
 class Runs:
     """Runs of one model.
 
-    draws: their numbers, rising, shape (k,). values: of the quantity [its unit]; infinite where a run failed. chances:
-    with which each draw was chosen [-]; 1 for those of the pilot and where all draws are run.
+    draws: numbers of the draws, rising, shape (k,). values: of the quantity, shape (k,) [its unit]; infinite where a
+    run failed. chances: probability with which each draw was chosen, shape (k,) [-]; 1 in the pilot and where all draws
+    are run.
     """
 
     draws: Indices
@@ -53,12 +58,13 @@ class Moment:
     """An estimated mean.
 
     Attributes:
-        value: the estimate.
-        variance: of it.
+        value: the estimate of the mean.
+        variance: variance of the estimate.
         freedom: degrees of freedom of the variance.
-        variances: that each level has to estimate, shape (levels,) [its unit squared], for `optimal_runs`, exact first.
-        unseen: whether the variance is mostly that of errors of the prediction which no run showed; it falls with the
-            square of the number of exact runs.
+        variances: variance of one run of each level, exact first, shape (levels,) [its unit squared], for
+            `optimal_runs`.
+        unseen: whether most of the variance is an allowance for errors of the prediction that no run showed; such a
+            variance falls with the square of the number of exact runs.
     """
 
     value: float
@@ -74,98 +80,97 @@ class Moment:
 
 
 def quantile_of_t(freedom: float) -> float:
-    """How many standard errors half the width of an interval of 95 % has."""
+    """Half the width of an interval of 95 %, over the standard error: the quantile of Student's t distribution."""
     from scipy.special import stdtrit
 
-    return float(stdtrit(max(freedom, 1.0), (1 + LEVEL) / 2))
+    return float(stdtrit(max(freedom, 1.0), (1 + CONFIDENCE) / 2))
 
 
-def bent(x: Array, y: Array, weights: Array) -> Callable[[Array], Array]:
-    """The regression of y on x and, where all are above 0, its logarithm; level beyond the range of x."""
-    return _within(x, _extended(x, y, weights))
+def curve(x: Array, y: Array, weights: Array) -> Function:
+    """The regression of y on x and, where all x are above 0, on log x; constant beyond the range of x."""
+    return _constant_beyond(x, _extended_curve(x, y, weights))
 
 
-def _extended(x: Array, y: Array, weights: Array) -> Callable[[Array], Array]:
-    """The same, extended beyond the range of x."""
+def _extended_curve(x: Array, y: Array, weights: Array) -> Function:
+    """The regression of `curve`, extended beyond the range of x."""
     low = float(x.min())
     if low <= 0:
         return _regression(x, y, weights, [np.asarray])
     return _regression(x, y, weights, [np.asarray, lambda at: np.log(np.maximum(at, low / 100))])
 
 
-def _within(x: Array, function: Callable[[Array], Array]) -> Callable[[Array], Array]:
+def _constant_beyond(x: Array, function: Function) -> Function:
+    """The function, with its values at the ends of the range of x beyond that range."""
     low, high = float(x.min()), float(x.max())
     return lambda at: function(np.clip(at, low, high))
 
 
-def _regression(
-    x: Array, y: Array, weights: Array, functions: Sequence[Callable[[Array], Array]]
-) -> Callable[[Array], Array]:
-    """Least squares of y on functions of x, with a prior of their scaled slopes that is worth next to nothing."""
-    columns = np.stack([function(x) for function in functions], axis=-1)
-    share = weights / weights.sum()
-    centre, level = share @ columns, float(share @ y)
-    spread = np.sqrt(share @ (columns - centre) ** 2)
+def _regression(x: Array, y: Array, weights: Array, terms: Sequence[Function]) -> Function:
+    """Weighted least squares of y on a constant and terms of x; the slopes have a prior of nearly no weight."""
+    columns = np.stack([term(x) for term in terms], axis=-1)
+    shares = weights / weights.sum()
+    centre, mean = shares @ columns, float(shares @ y)
+    spread = np.sqrt(shares @ (columns - centre) ** 2)
     scaled = (columns - centre) / np.where(spread > 0, spread, 1.0)
-    worth = len(y) * share
-    normal = scaled.T * worth @ scaled + np.diag(np.where(spread > 0, PRIOR, 1.0))
-    slopes = np.linalg.solve(normal, scaled.T * worth @ (y - level)) / np.where(spread > 0, spread, 1.0)
+    counts = len(y) * shares
+    normal = scaled.T * counts @ scaled + np.diag(np.where(spread > 0, PRIOR, 1.0))
+    slopes = np.linalg.solve(normal, scaled.T * counts @ (y - mean)) / np.where(spread > 0, spread, 1.0)
 
     def predict(at: Array) -> Array:
-        return np.asarray(level + (np.stack([function(at) for function in functions], axis=-1) - centre) @ slopes)
+        return np.asarray(mean + (np.stack([term(at) for term in terms], axis=-1) - centre) @ slopes)
 
     return predict
 
 
-def parabola(x: Array, y: Array, weights: Array) -> Callable[[Array], Array]:
-    """The regression parabola of y on x."""
+def parabola(x: Array, y: Array, weights: Array) -> Function:
+    """The regression parabola of y on x; constant beyond the range of x."""
     centre = float(x.mean())
-    return _within(x, _regression(x, y, weights, [np.asarray, lambda at: (at - centre) ** 2]))
+    return _constant_beyond(x, _regression(x, y, weights, [np.asarray, lambda at: (at - centre) ** 2]))
 
 
-def logistic(x: Array, y: Array, _: Array) -> Callable[[Array], Array]:
-    """The logistic curve of shares y in [0, 1] over x, whose slope has a weak prior."""
-    standard = _standard(x)
-    level = np.log((y.sum() + 0.5) / (len(y) - y.sum() + 0.5))
-    rows = np.stack([np.ones(len(x)), standard(x)], axis=-1)
-    solution = _newton(rows, y, np.zeros(len(x)), np.array([level, 0.0]), np.array([1e-3, RIDGE]))
-    return lambda at: _expit(solution[0] + solution[1] * standard(at))
+def logistic(x: Array, y: Array, _: Array) -> Function:
+    """The logistic curve through shares y in [0, 1] over x, whose slope has a weak prior; without weights."""
+    standardised = _standardised(x)
+    intercept = np.log((y.sum() + 0.5) / (len(y) - y.sum() + 0.5))
+    rows = np.stack([np.ones(len(x)), standardised(x)], axis=-1)
+    solution = _newton(rows, y, np.zeros(len(x)), np.array([intercept, 0.0]), np.array([1e-3, RIDGE]))
+    return lambda at: _expit(solution[0] + solution[1] * standardised(at))
 
 
 def exceedance(threshold: float, extended: bool = False) -> Fit:
-    """A fit of values y over x, of which comes the probability that y is at least a threshold.
+    """A fit that takes values y and predicts the probability that y is at least a threshold.
 
-    It is the normal law about the regression line of the logarithms, which uses how far every run is from the
-    threshold; its level and slope are then fitted to the runs that exceed it, with a prior worth some runs. extended:
-    beyond the range of x too, where otherwise it is level.
+    The prediction is a normal law about the regression line of log y, which uses the distance of every run from the
+    threshold. Intercept and slope of the law are then corrected by a logistic regression on which runs exceed, with a
+    prior worth some runs. extended: the line continues beyond the range of x, where otherwise it is constant.
     """
 
-    def fit(x: Array, y: Array, weights: Array) -> Callable[[Array], Array]:
+    def fit(x: Array, y: Array, weights: Array) -> Function:
         finite = np.isfinite(y)
         if finite.sum() < 4:
             return logistic(x, (y >= threshold).astype(float), weights)
-        logs = threshold > 0 and float(y[finite].min()) > 0
-        heights, bound = (np.log(y[finite]), np.log(threshold)) if logs else (y[finite], threshold)
-        standard = _standard(x)
-        fitted = standard(x[finite])
+        positive = threshold > 0 and float(y[finite].min()) > 0
+        heights, bound = (np.log(y[finite]), np.log(threshold)) if positive else (y[finite], threshold)
+        standardised = _standardised(x)
+        fitted = standardised(x[finite])
         straight = _regression(fitted, heights, np.ones(len(heights)), [np.asarray])
-        regression = straight if extended else _within(fitted, straight)
-        left = heights - regression(fitted)
-        deviation = max(float(left.std()), 1e-3 * (float(heights.std()) or 1.0), 1e-12)
+        line = straight if extended else _constant_beyond(fitted, straight)
+        residuals = heights - line(fitted)
+        deviation = max(float(residuals.std()), 1e-3 * (float(heights.std()) or 1.0), 1e-12)
 
         def offset(at: Array) -> Array:
-            return NORMAL * (regression(standard(at)) - bound) / deviation
+            return NORMAL * (line(standardised(at)) - bound) / deviation
 
-        own = offset(x)
-        rows = np.stack([np.ones(len(x)), own], axis=-1)
-        solution = _newton(rows, (y >= threshold).astype(float), own, np.zeros(2), np.array([1.0, 4.0]))
+        offsets = offset(x)
+        rows = np.stack([np.ones(len(x)), offsets], axis=-1)
+        solution = _newton(rows, (y >= threshold).astype(float), offsets, np.zeros(2), np.array([1.0, 4.0]))
         return lambda at: _expit(solution[0] + (1 + solution[1]) * offset(at))
 
     return fit
 
 
-def _standard(x: Array) -> Callable[[Array], Array]:
-    """Values less the mean of x, over its standard deviation; of logarithms where all x are above 0."""
+def _standardised(x: Array) -> Function:
+    """The function that subtracts the mean of x and divides by its deviation; of log x where all x are above 0."""
     low = float(x.min())
 
     def scaled(at: Array) -> Array:
@@ -183,114 +188,118 @@ def _expit(eta: Array) -> Array:
 
 
 def _newton(rows: Array, y: Array, offset: Array, start: Array, prior: Array) -> Array:
-    """Coefficients of a logistic regression of shares y with an offset, and a normal prior of these weights about 0."""
+    """Coefficients, shape (k,), of a logistic regression of shares y, shape (runs,), on rows, shape (runs, k).
+
+    offset: added to the predictor, shape (runs,). prior: weights of a normal prior about 0, shape (k,).
+    """
     solution = start
     for _ in range(30):
         share = _expit(offset + rows @ solution)
         gradient = rows.T @ (y - share) - prior * solution
         information = (rows * (share * (1 - share))[:, None]).T @ rows + np.diag(prior)
         step = np.linalg.solve(information, gradient)
-        most = float(np.abs(step).max())
-        solution = solution + step * min(1.0, 2.0 / (most + 1e-300))
-        if most < 1e-8:
+        largest = float(np.abs(step).max())
+        solution = solution + step * min(1.0, 2.0 / (largest + 1e-300))
+        if largest < 1e-8:
             break
     return solution
 
 
 def feature(values: Array) -> Array:
-    """Values of a model for the fit of a prediction, shape (runs,) [unit of `values`]; of a failed run the largest."""
+    """The values of a model, a failed run with the largest of all others, shape (runs,) [unit of `values`]."""
     finite = values[np.isfinite(values)]
-    most = float(finite.max()) if len(finite) else 0.0
-    return np.where(np.isfinite(values), values, most)
+    largest = float(finite.max()) if len(finite) else 0.0
+    return np.where(np.isfinite(values), values, largest)
 
 
 def predictions(
     fit: Fit, draws: Indices, x: Array, target_draws: Indices, target: Array, weights: Array | None = None
 ) -> Array:
-    """For every draw the prediction of a target from x, fitted to other folds; shape of `draws` [unit of `target`].
+    """The prediction of a target at every draw from x, fitted to the other folds; shape of `draws` [unit of `target`].
 
-    target_draws are among `draws`. weights: of the targets in the fit; None: equal.
+    target_draws: draws at which the target is known, a subset of `draws`. weights: of the targets in the fit; None:
+    equal.
     """
-    known = x[np.searchsorted(draws, target_draws)]
+    fitted = x[np.searchsorted(draws, target_draws)]
     weights = np.ones(len(target)) if weights is None else weights
-    out = np.empty(len(draws))
+    predicted = np.empty(len(draws))
     for fold in range(FOLDS):
-        others, here = target_draws % FOLDS != fold, draws % FOLDS == fold
-        out[here] = fit(known[others], target[others], weights[others])(x[here])
-    return out
+        others, inside = target_draws % FOLDS != fold, draws % FOLDS == fold
+        predicted[inside] = fit(fitted[others], target[others], weights[others])(x[inside])
+    return predicted
 
 
 def telescoped(
-    target: Array, levels: Sequence[Runs], pilot: int, population: int | None = None, fit: Fit = bent,
+    target: Array, levels: Sequence[Runs], pilot: int, population: int | None = None, fit: Fit = curve,
     threshold: float | None = None,
 ) -> Moment:  # fmt: skip
-    """The mean of a target that is known at the exact runs.
+    """The mean of a target that is known at the exact runs, as a telescoping sum over the levels.
 
-    levels: exact first; the draws of each are among those of the next, and the last has all. pilot: number of draws
-    that all levels have. population: number of all draws that there are; None: no end of them. fit: of predictions.
-    threshold: the target is the values, and their mean the probability that they are at least this.
+    levels: exact first; the draws of a level are a subset of the draws of the next, and the last level has all draws.
+    pilot: number of draws that every level runs. population: number of draws that exist; None: unlimited. fit: of the
+    predictions. threshold: the target holds values, and the mean is the probability that they are at least this.
     """
     count = len(levels[-1].draws)
-    parts, current, fitted = [], target if threshold is None else (target >= threshold).astype(float), target
+    terms, current, fitted = [], target if threshold is None else (target >= threshold).astype(float), target
     for upper, lower in pairwise(levels):
-        first = fit if threshold is None else exceedance(threshold) if upper is levels[0] else logistic
-        predicted = predictions(first, lower.draws, feature(lower.values), upper.draws, fitted, 1 / upper.chances)
+        own_fit = fit if threshold is None else exceedance(threshold) if upper is levels[0] else logistic
+        predicted = predictions(own_fit, lower.draws, feature(lower.values), upper.draws, fitted, 1 / upper.chances)
         difference = current - predicted[np.searchsorted(lower.draws, upper.draws)]
-        parts.append(_contributions(upper, difference, pilot, count))
+        terms.append(_contributions(upper, difference, pilot, count))
         current = fitted = predicted
-    parts.append(current)
+    terms.append(current)
     groups = [slice(0, pilot), slice(pilot, count)] if 1 < pilot < count - 1 else [slice(0, count)]
     unseen = 0.0
-    if threshold is not None:  # that none of n runs errs does not mean that none does: variance by Jeffreys' prior
+    if threshold is not None:  # n runs without an error do not exclude errors: variance by Jeffreys' prior
         inverse = 1 / levels[0].chances[levels[0].draws >= pilot]
         unseen = 0.5 / (pilot + inverse.sum() ** 2 / max(inverse @ inverse, 1.0)) ** 2
-    ends = [len(level.draws) for level in levels]
-    left = np.array([1.0 if population is None else max(1 - end / population, 0.0) for end in ends])
-    own = [_variance(part, groups) for part in parts]
-    variances = left * np.array([max(own[0], unseen), *own[1:]])
-    variance = max(_variance(sum(parts, np.zeros(count)), groups) if population is None else 0.0, variances.sum())
-    freedom = np.maximum(np.minimum(np.array(ends) - 2.0, [_freedom(part, groups) for part in parts]), 1.0)
-    total = float(variance**2 / max(np.sum(variances**2 / freedom), 1e-300)) if variance > 0 else np.inf
-    planned = variances * ends * variance / max(float(variances.sum()), 1e-300)
-    value = float(np.mean(sum(parts, np.zeros(count))))
-    return Moment(value, float(variance), total, planned, bool(unseen > variance / 2))
+    runs = [len(level.draws) for level in levels]
+    remaining = np.array([1.0 if population is None else max(1 - number / population, 0.0) for number in runs])
+    sampled = [_variance(term, groups) for term in terms]
+    variances = remaining * np.array([max(sampled[0], unseen), *sampled[1:]])
+    variance = max(_variance(sum(terms, np.zeros(count)), groups) if population is None else 0.0, variances.sum())
+    freedoms = np.maximum(np.minimum(np.array(runs) - 2.0, [_freedom(term, groups) for term in terms]), 1.0)
+    freedom = float(variance**2 / max(np.sum(variances**2 / freedoms), 1e-300)) if variance > 0 else np.inf
+    planned = variances * runs * variance / max(float(variances.sum()), 1e-300)
+    value = float(np.mean(sum(terms, np.zeros(count))))
+    return Moment(value, float(variance), freedom, planned, bool(unseen > variance / 2))
 
 
 def _contributions(level: Runs, difference: Array, pilot: int, count: int) -> Array:
-    """What every draw adds to `count` times the mean of a difference that is known at some of them; shape (count,).
+    """The contribution of every draw to a mean difference, times `count`, shape (count,); 0 where a draw has no run.
 
-    The means over the pilot and over the other draws are weighted by the numbers of runs that they are worth, of the
-    others with chances in proportion to what predictions leave.
+    The means over the pilot and over the chosen draws are weighted by the numbers of runs that they are worth. A chosen
+    draw is weighted by the inverse of its chance.
     """
-    out = np.zeros(count)
-    first = level.draws < pilot
-    main, runs = level.chances[~first], float(first.sum())
-    if not len(main):
-        out[level.draws] = difference * count / max(runs, 1.0)
-        return out
-    share = runs / (runs + (count - pilot) * float(main.mean()))
-    out[level.draws[first]] = difference[first] * share * count / max(pilot, 1)
-    out[level.draws[~first]] = difference[~first] / main * (1 - share) * count / (count - pilot)
-    return out
+    contributions = np.zeros(count)
+    in_pilot = level.draws < pilot
+    chances, runs = level.chances[~in_pilot], float(in_pilot.sum())
+    if not len(chances):
+        contributions[level.draws] = difference * count / max(runs, 1.0)
+        return contributions
+    share = runs / (runs + (count - pilot) * float(chances.mean()))
+    contributions[level.draws[in_pilot]] = difference[in_pilot] * share * count / max(pilot, 1)
+    contributions[level.draws[~in_pilot]] = difference[~in_pilot] / chances * (1 - share) * count / (count - pilot)
+    return contributions
 
 
 def _variance(contributions: Array, groups: Sequence[slice]) -> float:
-    """Variance of the mean of contributions, of draws that are alike within each group."""
+    """Variance of the mean of contributions; the draws of one group have the same distribution."""
     count = len(contributions)
-    parts = [contributions[group] for group in groups]
-    return float(sum(len(part) * part.var(ddof=1) for part in parts if len(part) > 1)) / count**2
+    samples = [contributions[group] for group in groups]
+    return float(sum(len(sample) * sample.var(ddof=1) for sample in samples if len(sample) > 1)) / count**2
 
 
 def _freedom(contributions: Array, groups: Sequence[slice]) -> float:
     """Degrees of freedom of `_variance`: twice its square over its own variance (Satterthwaite, 1946).
 
-    The variance of a sample variance follows from the fourth moment: a few large contributions among many small ones
-    say little about the variance, which the number of runs alone does not tell.
+    The variance of a sample variance follows from the fourth moment. So a few large contributions among many small
+    contributions give few degrees of freedom, whatever the number of runs.
     """
-    parts = [contributions[group] for group in groups]
-    deviations = [(part - part.mean()) ** 2 for part in parts if len(part) > 1]
-    own = sum(float(((squares - squares.mean()) ** 2).sum()) for squares in deviations)
-    return 2 * float(sum(squares.sum() for squares in deviations)) ** 2 / own if own > 0 else np.inf
+    samples = [contributions[group] for group in groups]
+    deviations = [(sample - sample.mean()) ** 2 for sample in samples if len(sample) > 1]
+    variance = sum(float(((squares - squares.mean()) ** 2).sum()) for squares in deviations)
+    return 2 * float(sum(squares.sum() for squares in deviations)) ** 2 / variance if variance > 0 else np.inf
 
 
 def exceeding(levels: Sequence[Runs], threshold: float, pilot: int, population: int | None = None) -> Moment:
@@ -308,10 +317,10 @@ def variance_of(levels: Sequence[Runs], pilot: int, population: int | None = Non
 def quantile_of(
     levels: Sequence[Runs], share: float, pilot: int, population: int | None = None
 ) -> tuple[float, tuple[float, float], Moment]:
-    """The value below which a share of all lies, its interval, and the probability to be above it.
+    """The value below which a share of all draws lies, its interval, and the probability of exceeding the value.
 
-    The interval contains the values whose estimated probability differs from the share by less than half the width of
-    its own interval (Woodruff, 1952).
+    The interval contains the values whose estimated probability of exceedance differs from 1 - share by less than half
+    the width of the interval of that probability (Woodruff, 1952).
     """
     from scipy.optimize import brentq
 
@@ -321,7 +330,7 @@ def quantile_of(
     def above(at: float) -> Moment:
         return exceeding(levels, at, pilot, population)
 
-    def place(probability: float) -> float:
+    def value_at(probability: float) -> float:
         if above(ends[0]).value <= probability:
             return ends[0]
         if above(ends[1]).value >= probability:
@@ -329,37 +338,39 @@ def quantile_of(
         root = brentq(lambda at: above(at).value - probability, *ends, xtol=1e-4 * (ends[1] - ends[0]))
         return float(root)
 
-    quantile = place(1 - share)
+    quantile = value_at(1 - share)
     moment = above(quantile)
-    low, high = (place(float(np.clip(1 - share + sign * moment.half, 0.0, 1.0))) for sign in (1, -1))
+    low, high = (value_at(float(np.clip(1 - share + sign * moment.half, 0.0, 1.0))) for sign in (1, -1))
     return quantile, (low, high), moment
 
 
 def uncertainty(x: Array, values: Array, threshold: float | None, at: Array) -> Array:
-    """In proportion to which chance a draw should be run exactly [-]: shape of `at` (Neyman, 1934).
+    """Weights in proportion to which draws are chosen for exact runs, shape of `at` [-] (Neyman, 1934).
 
-    threshold: of a probability: the deviation of a yes or no with the predicted share, at least a fifth of the
-    largest; a rare event lies beyond the range of the pilot, so an extended prediction counts as well. None: for a
-    mean the predicted distance from the prediction, at least a quarter of its mean, and beyond the range of the pilot
-    what an extended prediction would add. So a model that errs is found out.
+    x, values: of the cheap and of the exact model in the pilot. at: values of the cheap model at all draws.
+    threshold: for a probability; the weight is the standard deviation of the exceedance (0 or 1) at its predicted
+    probability, and at least a fifth of the largest. A rare event lies beyond the range of the pilot, so the
+    prediction is also extended, and the larger deviation counts.
+    None: for a mean; the weight is the predicted error of the prediction, and at least a quarter of its mean. Beyond
+    the range of the pilot the change by an extended prediction is added, so that errors of the cheap model show.
     """
     equal = np.ones(len(x))
     if threshold is not None:
-        level, extended = (exceedance(threshold, far)(x, values, equal)(at) for far in (False, True))
-        return np.clip(np.sqrt(np.maximum(level * (1 - level), extended * (1 - extended))), 0.1, 0.5)
-    left = np.abs(values - bent(x, values, equal)(x))
-    mean = float(left.mean())
+        constant, extended = (exceedance(threshold, far)(x, values, equal)(at) for far in (False, True))
+        return np.clip(np.sqrt(np.maximum(constant * (1 - constant), extended * (1 - extended))), 0.1, 0.5)
+    errors = np.abs(values - curve(x, values, equal)(x))
+    mean = float(errors.mean())
     if not mean > 0:
         return np.ones(len(at))
-    beyond = np.abs(_extended(x, values, equal)(at) - bent(x, values, equal)(at)) / mean
-    return np.maximum(bent(x, left, equal)(at) / mean, LEAST) + beyond
+    beyond = np.abs(_extended_curve(x, values, equal)(at) - curve(x, values, equal)(at)) / mean
+    return np.maximum(curve(x, errors, equal)(at) / mean, LEAST) + beyond
 
 
 @dataclass(frozen=True)
 class Chain:
-    """Models that are used together, the exact one first, and what they save.
+    """Models that are used together, the exact model first.
 
-    work: seconds that they need for a variance, over those of the exact model alone.
+    work: time of the chain for a given variance, over the time of the exact model alone.
     """
 
     models: tuple[str, ...]
@@ -367,10 +378,10 @@ class Chain:
 
 
 def shares_of_variance(correlations: Array) -> Array:
-    """The part of the variance of the exact model that each level of a chain has to estimate, shape (k,) [-].
+    """The share of the variance of the exact model that each level of a chain has to estimate, shape (k,) [-].
 
-    correlations: of every model with the exact one, which comes first, falling, shape (k,). Each level estimates its
-    difference from the next; the last one estimates its own mean.
+    correlations: of every level with the exact model, which comes first; falling, shape (k,). Each level estimates its
+    difference from the next level; the last level estimates its own mean.
     """
     squares = np.append(np.asarray(correlations, dtype=float) ** 2, 0.0)
     shares: Array = squares[:-1] - squares[1:]
@@ -378,9 +389,9 @@ def shares_of_variance(correlations: Array) -> Array:
 
 
 def work_of(shares: Array, costs: Array) -> float:
-    """Seconds times variance of a chain with optimal numbers of runs, over those of plain Monte Carlo.
+    """Time of a chain for a given variance, with optimal numbers of runs, over the time of plain Monte Carlo.
 
-    shares: of variance, shape (k,). costs: of a run of each model [s], shape (k,).
+    shares: as of `shares_of_variance`. costs: of a run of each level, shape (k,) [s].
     """
     return float(np.sum(np.sqrt(shares * costs)) ** 2 / costs[0])
 
@@ -388,10 +399,10 @@ def work_of(shares: Array, costs: Array) -> float:
 def optimal_runs(
     variances: Array, costs: Array, *, variance: float | None = None, seconds: float | None = None
 ) -> Array:
-    """Numbers of runs of each level, not rounded, for a variance of the estimate or for a time [s]; shape (k,).
+    """Numbers of runs of each level, not rounded, shape (k,) [-], for a variance of the estimate or for a time.
 
-    variances: that each level has to estimate. They are in proportion to sqrt(variance / cost), and a level has no
-    fewer runs than the one before it.
+    variances: of one run of each level, shape (k,). costs: of a run, shape (k,) [s]. The numbers are in proportion to
+    sqrt(variance / cost), and a level has no fewer runs than the level before it. seconds: of all runs [s].
     """
     ratios = np.maximum.accumulate(np.sqrt(np.maximum(variances, 0.0) / costs) + 1e-300)
     if variance is not None:
@@ -401,9 +412,9 @@ def optimal_runs(
 
 
 def factor_for(weights: Array, wanted: float, least: float) -> float:
-    """The factor with which chances in proportion to weights choose as many draws as wanted on average.
+    """The factor for which the chances min(factor * weights + least, 1) choose `wanted` draws on average.
 
-    Chances are at most 1. least: what is added to each of them.
+    weights: of the draws, shape (draws,) [-].
     """
     from scipy.optimize import brentq
 
@@ -420,16 +431,16 @@ def factor_for(weights: Array, wanted: float, least: float) -> float:
 
 
 def best_chain(correlations: Mapping[str, float], costs: Mapping[str, float]) -> Chain:
-    """The models whose use together is cheapest: all subsets are compared by the closed form.
+    """The cheapest chain of models; all subsets are compared by the closed form.
 
-    correlations: model -> that with the exact one. costs: model -> seconds of a run, the exact one's included.
+    correlations: model -> correlation with the exact model. costs: model -> cost of a run [s], with the exact model.
     """
     cheaper = sorted((name for name in correlations if name != EXACT), key=lambda name: -abs(correlations[name]))
     best = Chain((EXACT,), 1.0)
     for chosen in chain.from_iterable(combinations(cheaper, count + 1) for count in range(len(cheaper))):
         shares = shares_of_variance(np.array([1.0, *(abs(correlations[name]) for name in chosen)]))
-        paid = np.array([costs[name] for name in (EXACT, *chosen)])
-        rising = (shares >= 0).all() and (np.diff(shares / paid) > 0).all()  # numbers of runs along the chain
-        if rising and (work := work_of(shares, paid)) < best.work:
+        seconds = np.array([costs[name] for name in (EXACT, *chosen)])
+        rising = (shares >= 0).all() and (np.diff(shares / seconds) > 0).all()  # numbers of runs along the chain
+        if rising and (work := work_of(shares, seconds)) < best.work:
             best = Chain((EXACT, *chosen), work)
     return best

@@ -1,11 +1,12 @@
-"""Draws of a study, and the runs of its models on them: each model is a study of its own, kept in a folder.
+"""The runs of an estimate: numbers of draws come in, values of a model at these draws go out.
 
-A draw is a combination of the values of the axes with values, each as likely as any other, and a value of each random
-axis. Draw k is the same for every model, in every call.
+A draw is a combination of the values of the gridded axes, all equally likely, and one value of each random axis. Draw k
+is the same for every model and in every call. The runs of each model are a study of its own in a folder.
 
-For a fragility a run is the search for the intensity at which the quantity of a draw reaches a threshold. The runs of
-the search are at the scales of the study. They close in on the two neighbours between which the threshold lies, and
-power laws between neighbours give the crossing (Vamvatsikos and Cornell, 2002, trace and fill an IDA curve alike).
+For a fragility, `Searches` takes the place of a run: it finds the intensity at which the quantity of a draw reaches a
+threshold. The runs of a search are at scales of the study. They close in on the two neighbouring scales between which
+the quantity reaches the threshold, and a power law between the two gives the crossing (in the manner of the IDA curves
+of Vamvatsikos and Cornell, 2002).
 """
 
 from __future__ import annotations
@@ -30,37 +31,42 @@ from msfp_gen.studies.estimation.estimators import EXACT, Flags, Indices
 from msfp_gen.studies.run import STUDY_FILE, parts_in, readable_parts, run_on, study_table
 
 BLOCK = 1024  # draws that are made together
-CHUNKS = {EXACT: 4, "backbone": 64}  # runs of a part; of other models
-CHUNK = 8
-MEASURED = 4  # parts of which the cost of a run is taken
-ENDED = "ok"
+CHUNKS = {EXACT: 4, "backbone": 64}  # model -> runs of a part
+CHUNK = 8  # runs of a part of any other model
+MEASURED = 4  # parts from which the cost of a run is computed
+ENDED = "ok"  # status of a run that reached its end
 
 
 class Source(Protocol):
-    """What an estimate needs: runs of several models on the same draws.
+    """Runs of several models on the same draws.
 
-    levels: names, exact first. population: how many draws there are; None: no end of them.
+    levels: names of the models, the exact model first. population: number of draws that exist; None: unlimited.
     """
 
     levels: tuple[str, ...]
     population: int | None
 
     def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
-        """The quantity at draws, shape (draws,) [its unit], computed if need be; which ended early: what they reached.
+        """The quantity at draws, shape (draws,) [its unit], and which runs ended early, shape (draws,).
 
-        Infinite where a run has none. scales: index of the value of the axis `scale` of each run, in place of that of
-        the draw.
+        Missing runs are computed. The quantity of a run that ended early is the value until then; it is infinite where
+        a run has no value. scales: index of the scale of each run, shape (draws,), in place of the scale of its draw.
         """
 
     def cost(self, level: str) -> float:
-        """Seconds of a run, as measured."""
+        """Core time of a run of a model, as measured [s]."""
 
     def spent(self) -> tuple[float, dict[str, int]]:
-        """Seconds of all runs, and their number by model."""
+        """Core time of all runs [s], and model -> number of its runs."""
 
 
 class Draws:
-    """The random draws of a study; equal for equal seeds."""
+    """The random draws of a study; equal for equal seeds.
+
+    Attributes:
+        cells: number of combinations of the values of the gridded axes.
+        population: number of draws that exist, where there is no random axis; else None.
+    """
 
     def __init__(self, study: Study, seed: int) -> None:
         self.study, self.seed = study, seed
@@ -70,7 +76,10 @@ class Draws:
         self._order = np.random.default_rng([seed, 0]).permutation(self.cells) if self.population else None
 
     def of(self, numbers: Indices) -> tuple[Indices, Array]:
-        """Of draws by number, (draws,): the combination, from 0, and values of the random axes [units of the axes]."""
+        """Draws by number, shape (draws,): their combinations, from 0, shape (draws,), and values of the random axes.
+
+        The values have shape (draws, random axes) [units of the axes].
+        """
         if self._order is not None:
             return self._order[numbers], np.zeros((len(numbers), 0))
         cells, values = zip(
@@ -87,18 +96,21 @@ class Draws:
         return self._blocks[block]
 
     def intensity(self, numbers: Indices) -> Array:
-        """The intensity of draws at scale 1, shape (draws,), [m/s^2]; ones where the study has none."""
-        measures = self.study.recipe.intensities
-        if not measures:
+        """The intensity of draws at scale 1, shape (draws,) [m/s^2]; 1 where the study has no intensity."""
+        of_record = self.study.recipe.intensities
+        if not of_record:
             return np.ones(len(numbers))
         gridded = [axis for axis in self.study.axes if axis.values is not None]
-        place = [axis.name for axis in gridded].index("record")
-        codes = np.unravel_index(self.of(numbers)[0], self.study.grid)[place]
-        return np.array([measures[(gridded[place].values or ())[code]] for code in codes])
+        position = [axis.name for axis in gridded].index("record")
+        records = np.unravel_index(self.of(numbers)[0], self.study.grid)[position]
+        return np.array([of_record[(gridded[position].values or ())[record]] for record in records])
 
 
 class StudySource:
-    """The models of a study; exact runs are in its folder, those of others in folders within it."""
+    """The source of a study: exact runs are in the folder of the study, runs of each other model in a folder within.
+
+    progress: called with the name of a model and the number of draws, before `values` of these draws.
+    """
 
     def __init__(
         self, study: Study, folder: Path, quantity: str, levels: Sequence[str], seed: int, pool: Pool,
@@ -108,10 +120,10 @@ class StudySource:
         self.draws = Draws(study, seed)
         self.population = self.draws.population
         check_quantity(study, quantity, levels)
-        places = {level: folder if level == EXACT else folder / level for level in levels}
+        folders = {level: folder if level == EXACT else folder / level for level in levels}
         self._models = {
-            level: _Model(level_study(study, level, quantity), place, quantity, self.draws, pool)
-            for level, place in places.items()
+            level: _Model(level_study(study, level, quantity), own_folder, quantity, self.draws, pool)
+            for level, own_folder in folders.items()
         }
         self._progress = progress
 
@@ -132,29 +144,31 @@ class StudySource:
 
 
 class _Model:
-    """The runs of one model: (draw, index of its scale or -1) of every row, as they were asked for."""
+    """The runs of one model, kept as a study in a folder.
+
+    listed: (draw, index of the scale in place of the scale of the draw, or -1) of every row, in the order of requests.
+    """
 
     def __init__(self, study: Study, folder: Path, quantity: str, draws: Draws, pool: Pool) -> None:
         self.study, self.folder, self.quantity, self.draws, self.pool = study, folder, quantity, draws, pool
         self.listed: list[tuple[int, int]] = []
         if (folder / STUDY_FILE).is_file():
-            kept = study_table(folder).get("accuracy", {}).get("listed", [])
-            self.listed = [(int(draw), int(scale)) for draw, scale in kept]
-        self._reached, self._early = np.zeros(0), np.zeros(0, dtype=bool)
+            listed = study_table(folder).get("accuracy", {}).get("listed", [])
+            self.listed = [(int(draw), int(scale)) for draw, scale in listed]
+        self._values, self._early = np.zeros(0), np.zeros(0, dtype=bool)
 
     def values(self, draws: Indices, scales: Indices | None) -> tuple[Array, Flags]:
         pairs = list(zip(draws.tolist(), [-1] * len(draws) if scales is None else scales.tolist(), strict=True))
         present = set(self.listed)
-        if (missing := [pair for pair in dict.fromkeys(pairs) if pair not in present]) or not len(self._reached):
+        if (missing := [pair for pair in dict.fromkeys(pairs) if pair not in present]) or not len(self._values):
             self.listed += missing
             self._run()
-        place = {pair: row for row, pair in enumerate(self.listed)}
-        rows = [place[pair] for pair in pairs]
-        return self._reached[rows], self._early[rows]
+        row_of = {pair: row for row, pair in enumerate(self.listed)}
+        rows = [row_of[pair] for pair in pairs]
+        return self._values[rows], self._early[rows]
 
     def _run(self) -> None:
-        study = self._complete()
-        run_on(self.pool, study, self.folder)
+        run_on(self.pool, self._listed_study(), self.folder)
         rows = read_study(self.folder, [self.quantity])
         values = numbers(rows, self.quantity)
         ended = np.asarray(rows["status"] == ENDED)
@@ -162,15 +176,15 @@ class _Model:
             raise RunError(
                 f"{self.folder}: {len(self.listed) - len(values)} runs are missing; run the same command again"
             )
-        self._reached = np.where(np.isnan(values), np.inf, values)
+        self._values = np.where(np.isnan(values), np.inf, values)
         self._early = ~ended | np.isnan(values)
 
-    def _complete(self) -> Study:
-        """The study of all rows that were asked for."""
-        numbers_, scales = (np.array(column, dtype=np.intp) for column in zip(*self.listed, strict=True))
-        cells, values = self.draws.of(numbers_)
+    def _listed_study(self) -> Study:
+        """The study whose rows are the listed runs."""
+        draws, scales = (np.array(column, dtype=np.intp) for column in zip(*self.listed, strict=True))
+        cells, values = self.draws.of(draws)
         if (scales >= 0).any():
-            cells = _scaled(self.study, cells, scales)
+            cells = _with_scales(self.study, cells, scales)
         sampling = Sampling(
             "listed",
             values=tuple(map(tuple, values.tolist())) if values.shape[1] else None,
@@ -184,9 +198,9 @@ class _Model:
         )
 
     def cost(self) -> float:
-        """Median over the first parts of their seconds of a core for each run, so that it stays the same.
+        """Core time of a run [s]: median over the first parts, so that later runs do not change it.
 
-        Not the mean: in its first part a process builds or loads the model.
+        The mean would be too large: in its first part a process builds or loads the model.
         """
         import pyarrow.parquet as pq
 
@@ -198,17 +212,17 @@ class _Model:
         return float(np.median(seconds))
 
 
-def _scaled(study: Study, cells: Indices, scales: Indices) -> Indices:
-    """The combinations with another value of the axis `scale`."""
+def _with_scales(study: Study, cells: Indices, scales: Indices) -> Indices:
+    """The combinations with these values of the axis `scale`, by index; where the index is -1, as they are."""
     names = [axis.name for axis in study.axes if axis.values is not None]
-    codes = list(np.unravel_index(cells, study.grid))
-    place = names.index("scale")
-    codes[place] = np.where(scales >= 0, scales, codes[place])
-    return np.asarray(np.ravel_multi_index(codes, study.grid))
+    positions = list(np.unravel_index(cells, study.grid))
+    axis = names.index("scale")
+    positions[axis] = np.where(scales >= 0, scales, positions[axis])
+    return np.asarray(np.ravel_multi_index(positions, study.grid))
 
 
 def level_study(study: Study, level: str, quantity: str) -> Study:
-    """The study of one model: of the exact one as it is, of others with the quantity alone."""
+    """The study of one model: the exact model keeps all quantities of the study, any other this quantity alone."""
     chunk = CHUNKS.get(level, CHUNK)
     if level == EXACT:
         return replace(study, given_chunk=study.given_chunk or chunk)
@@ -221,7 +235,7 @@ def level_study(study: Study, level: str, quantity: str) -> Study:
 
 
 def check_quantity(study: Study, quantity: str, levels: Sequence[str]) -> None:
-    """Raise InputError: the study does not keep the quantity, or a model does not have it, or is not for the scene."""
+    """Raise InputError: the study does not keep the quantity, or a model lacks the quantity or refuses the scene."""
     if quantity not in study.keep.numbers:
         kept = ", ".join(study.keep.numbers)
         raise InputError(f"quantity = {quantity!r}: the study keeps {kept}; give one, or add it to keep")
@@ -242,7 +256,7 @@ def check_quantity(study: Study, quantity: str, levels: Sequence[str]) -> None:
 
 
 def _names_in(keep: Keep, quantity: str) -> list[str]:
-    """The quantities of which one is made."""
+    """The quantities in the formula of a quantity; the name itself where it has no formula."""
     text = dict(keep.formulas).get(quantity)
     if text is None:
         return [quantity]
@@ -253,9 +267,10 @@ def _names_in(keep: Keep, quantity: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Crossings:
-    """Logarithms of scales at which draws reach a threshold, shape (k,) [-], and how many are beyond the study.
+    """The scales at which the quantity of draws reaches a threshold.
 
-    runs: that the draws took, all together.
+    logarithms: of the scales, shape (draws,) [-]. beyond: number of crossings outside the scales of the study. runs:
+    number of runs of all searches.
     """
 
     logarithms: Array
@@ -264,40 +279,45 @@ class Crossings:
 
 
 def crossings(source: Source, level: str, draws: Indices, scales: Array, threshold: float, guess: Array) -> Crossings:
-    """Find where draws reach a threshold.
+    """Search the scales at which the quantity of draws reaches a threshold.
 
-    scales: rising. guess: of the logarithm of the scale of each crossing, with which the search begins.
+    scales: rising, shape (k,) [-]. guess: logarithm of the scale at which each search begins, shape (draws,) [-].
     """
-    count, most = len(draws), len(scales)
-    low, high = np.full(count, -1), np.full(count, most)  # neighbours: below, and at or above the threshold
-    values = np.full((count, most), np.nan)
-    following = np.searchsorted(np.log(scales), guess).clip(0, most - 1)
+    count = len(scales)
+    # Indices of scales next to each crossing: the quantity is below the threshold at `low`, at or above it at `high`.
+    low, high = np.full(len(draws), -1), np.full(len(draws), count)
+    values = np.full((len(draws), count), np.nan)
+    upcoming = np.searchsorted(np.log(scales), guess).clip(0, count - 1)
     runs = 0
-    while (open_ := np.flatnonzero(high - low > 1)).size:
-        at = following[open_]
-        reached, early = source.values(level, draws[open_], at)
-        values[open_, at] = np.where(early & (reached < threshold), np.inf, reached)
-        runs += len(open_)
-        over = values[open_, at] >= threshold
-        high[open_] = np.where(over, np.minimum(at, high[open_]), high[open_])
-        low[open_] = np.where(over, low[open_], np.maximum(at, low[open_]))
-        following = _following(low, high, following, most)
-    logs = np.array(
+    while (unfinished := np.flatnonzero(high - low > 1)).size:
+        at = upcoming[unfinished]
+        reached, early = source.values(level, draws[unfinished], at)
+        values[unfinished, at] = np.where(early & (reached < threshold), np.inf, reached)
+        runs += len(unfinished)
+        exceeds = values[unfinished, at] >= threshold
+        high[unfinished] = np.where(exceeds, np.minimum(at, high[unfinished]), high[unfinished])
+        low[unfinished] = np.where(exceeds, low[unfinished], np.maximum(at, low[unfinished]))
+        upcoming = _next_scale(low, high, upcoming, count)
+    logarithms = np.array(
         [_crossing(np.log(scales), row, lo, hi, threshold) for row, lo, hi in zip(values, low, high, strict=True)]
     )
-    return Crossings(logs, int(((low < 0) | (high >= most)).sum()), runs)
+    return Crossings(logarithms, int(((low < 0) | (high >= count)).sum()), runs)
 
 
-def _following(low: Indices, high: Indices, last: Indices, most: int) -> Indices:
-    """The scale to run next: a neighbour of the last one as long as one side is not known, else the middle."""
-    step = np.where(last == low, low + 1, high - 1)
+def _next_scale(low: Indices, high: Indices, last: Indices, count: int) -> Indices:
+    """Index of the scale to run next: beside the last scale until the crossing is enclosed, then in the middle."""
+    beside = np.where(last == low, low + 1, high - 1)
     middle = (low + high) // 2
-    known = (low >= 0) & (high < most)
-    return np.where(known, middle, step).clip(0, most - 1)
+    enclosed = (low >= 0) & (high < count)
+    return np.where(enclosed, middle, beside).clip(0, count - 1)
 
 
 def _crossing(logs: Array, values: Array, low: int, high: int, threshold: float) -> float:
-    """The crossing between two neighbours, by a power law; beyond the scales half a step from the last one."""
+    """Logarithm of the scale of a crossing, by a power law between two neighbours.
+
+    logs: logarithms of the scales. values: of the quantity at the scales. low, high: indices of the neighbours. Beyond
+    the scales the crossing is half a step from the last scale; where no power law exists, in the middle.
+    """
     if low < 0:
         return float(logs[0] - (logs[1] - logs[0]) / 2)
     if high >= len(logs):
@@ -310,7 +330,11 @@ def _crossing(logs: Array, values: Array, low: int, high: int, threshold: float)
 
 
 class Searches:
-    """A source of crossings: a run of it is the search of a draw. intensity: logarithm of that of draws at scale 1."""
+    """A source whose value at a draw is the logarithm of the intensity at which its quantity reaches a threshold.
+
+    source: of the runs of a search. scales: of the study, rising, shape (k,) [-]. intensity: draws -> logarithm of the
+    intensity at scale 1. beyond: number of exact crossings outside the scales.
+    """
 
     def __init__(self, source: Source, threshold: float, scales: Array, intensity: Callable[[Indices], Array]) -> None:
         self.source, self.threshold, self.scales, self.intensity = source, threshold, scales, intensity
@@ -320,30 +344,34 @@ class Searches:
         self._runs = dict.fromkeys(source.levels, 0)
 
     def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
-        """Logarithms of the intensities at which draws cross, shape (draws,) [-]; none ends early."""
-        known = self._values[level]
-        new = np.array([draw for draw in draws.tolist() if draw not in known], dtype=np.intp)
+        """Logarithms of the intensities of the crossings, shape (draws,) [-]; no search ends early."""
+        crossed = self._values[level]
+        new = np.array([draw for draw in draws.tolist() if draw not in crossed], dtype=np.intp)
         if new.size:
-            searches = crossings(self.source, level, new, self.scales, self.threshold, self._guess(level, new))
-            self._runs[level] += searches.runs
-            self.beyond += searches.beyond if level == EXACT else 0
-            known.update(zip(new.tolist(), searches.logarithms.tolist(), strict=True))
-        logs = np.array([known[draw] for draw in draws.tolist()])
-        return logs + self.intensity(draws), np.zeros(len(draws), dtype=bool)
+            found = crossings(self.source, level, new, self.scales, self.threshold, self._guess(level, new))
+            self._runs[level] += found.runs
+            self.beyond += found.beyond if level == EXACT else 0
+            crossed.update(zip(new.tolist(), found.logarithms.tolist(), strict=True))
+        logarithms = np.array([crossed[draw] for draw in draws.tolist()])
+        return logarithms + self.intensity(draws), np.zeros(len(draws), dtype=bool)
 
     def _guess(self, level: str, draws: Indices) -> Array:
-        """Where the search of a draw begins: where the cheapest model crosses, shifted by what the pilot showed."""
-        middle = np.full(len(draws), float(np.log(self.scales[len(self.scales) // 2])))
-        cheap = next((name for name in self.levels[1:] if self._values[name] and name != level), None)
-        if level != EXACT or cheap is None:
-            return middle
-        known = self._values[cheap]
-        shifts = [value - known[draw] for draw, value in self._values[level].items() if draw in known]
+        """Logarithm of the scale at which each search begins, shape (draws,) [-].
+
+        For the exact model it is the crossing of the first cheaper model that has any, shifted by the median
+        difference of the two models so far; for any other model the middle of the scales.
+        """
+        middle = float(np.log(self.scales[len(self.scales) // 2]))
+        cheaper = next((name for name in self.levels[1:] if self._values[name] and name != level), None)
+        if level != EXACT or cheaper is None:
+            return np.full(len(draws), middle)
+        crossed = self._values[cheaper]
+        shifts = [value - crossed[draw] for draw, value in self._values[level].items() if draw in crossed]
         shift = float(np.median(shifts)) if shifts else 0.0
-        return np.array([known.get(draw, at) + shift for draw, at in zip(draws.tolist(), middle, strict=True)])
+        return np.array([crossed.get(draw, middle) + shift for draw in draws.tolist()])
 
     def cost(self, level: str) -> float:
-        """Seconds of the search of a draw."""
+        """Core time of the search of a draw [s]."""
         return self.source.cost(level) * self._runs[level] / max(len(self._values[level]), 1)
 
     def spent(self) -> tuple[float, dict[str, int]]:
