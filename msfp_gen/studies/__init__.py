@@ -1,6 +1,8 @@
-"""Studies that take several runs: accuracy, bounding, sweeps, and studies of many runs (docs/studies.md).
+"""Studies of several runs: accuracy, bounding, sweeps, calibration, and studies of many runs (docs/studies.md).
 
-The functions for studies of many runs, but `msfp_gen.study` itself, are here.
+A study of many runs: a file becomes axes (`axes`), their values the scenes of the runs (`definition`), a pool runs the
+scenes (`batch`), and the kept quantities (`columns`) become the rows of a table (`run`), which `assessment` evaluates.
+This module offers the public functions for such studies; `msfp_gen.study` itself is in the package `msfp_gen`.
 """
 
 from importlib import import_module

@@ -1,7 +1,7 @@
-"""The axes of a study: their values or distributions, what each changes in the base scene, the scenes of their values.
+"""The axes of a study: values or distributions, what each axis changes in the base scene, and the scenes that result.
 
-Plans draw the values of random axes. Workers make the scene of a run from the base scene as a table. Only this module
-knows what the base of a study is; parts, pools and evaluations know rows.
+First step of a study: tables of axes come in; `Sampling` draws the values of random axes, and `SceneFactory`, in a
+worker, makes the scene of a run from one value for each axis.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.studies.bounding import bounded_scene
 from msfp_gen.studies.bounding.factors import FactorTable
 
-WITHIN = (2.0**-53, 1 - 2.0**-53)  # shares that have a finite value
-MOST = 10_000_000  # samples; each takes 8 bytes a random axis, in the process that starts the study
+WITHIN = (2.0**-53, 1 - 2.0**-53)  # least and largest probability at which every distribution has a finite value
+MOST = 10_000_000  # samples; each takes 8 bytes for each random axis, in the process that starts the study
 
 # Distribution -> its parameters.
 DISTRIBUTIONS: dict[str, tuple[str, ...]] = {
@@ -52,8 +52,9 @@ METHODS = {
 class Distribution:
     """A probability distribution of the values of an axis.
 
-    kind: a key of DISTRIBUTIONS. parameters: its numbers, in SI; `deviation` is the standard deviation, `dispersion`
-    that of the logarithm. between: bounds at which the distribution is cut off; None: not at all. Raises InputError.
+    kind: a key of DISTRIBUTIONS. parameters: numbers in the order of DISTRIBUTIONS [SI]; `deviation` is the standard
+    deviation of the value, `dispersion` the standard deviation of its logarithm. between: bounds at which the
+    distribution is cut off; None: no bounds. Raises InputError.
     """
 
     kind: str
@@ -72,25 +73,25 @@ class Distribution:
             raise InputError(f"between = {list(self.between)}: give bounds between which the distribution has values")
 
     def values(self, shares: Array) -> Array:
-        """The values below which these `shares` of the distribution lie, in (0, 1); of their shape [its unit]."""
+        """The quantiles at `shares`, probabilities in (0, 1); of the shape of `shares` [its unit]."""
         if self.between is not None:
             low, high = (self.share(bound) for bound in self.between)
             shares = low + shares * (high - low)
-        values = np.asarray(_frozen(self.kind, self.parameters).ppf(shares))
+        values = np.asarray(_scipy_distribution(self.kind, self.parameters).ppf(shares))
         if self.kind == "lognormal":  # the exponential of NumPy depends on the processor
             values = self.parameters[0] * exp(values)
         return values if self.between is None else np.clip(values, *self.between)
 
     def share(self, value: float) -> float:
-        """The share of the distribution, without its bounds, that lies below a value."""
+        """The cumulative probability of a value [-], without the bounds `between`."""
         if self.kind == "lognormal":
             value = float(np.log(value / self.parameters[0])) if value > 0 else -np.inf
-        return float(_frozen(self.kind, self.parameters).cdf(value))
+        return float(_scipy_distribution(self.kind, self.parameters).cdf(value))
 
 
 @lru_cache(maxsize=64)
-def _frozen(kind: str, parameters: tuple[float, ...]) -> Any:
-    """The distribution of `scipy.stats`, of a lognormal one that of the logarithm over the median."""
+def _scipy_distribution(kind: str, parameters: tuple[float, ...]) -> Any:
+    """The distribution as of `scipy.stats`; for a lognormal kind, of the logarithm of value over median."""
     from scipy import stats
 
     if kind == "triangular":
@@ -104,12 +105,13 @@ def _frozen(kind: str, parameters: tuple[float, ...]) -> Any:
 
 @dataclass(frozen=True)
 class Sampling:
-    """How the values of the random axes are drawn, together.
+    """How the values of the random axes are drawn: the table `[sampling]` of a study file.
 
-    method: a key of METHODS. samples: their number; for one-at-a-time it follows from the axes. seed: equal seeds give
-    equal values. quantiles: of each axis, for one-at-a-time. values: of every sample, for listed.
-    cells: with listed, the combination of the values of all other axes that each sample has, from 1, the last axis
-    fastest; None: every sample has all of them. Raises InputError.
+    method: a key of METHODS. samples: number of samples; None for one-at-a-time and listed, where it follows. seed:
+    equal seeds give equal values. quantiles: of each axis, for one-at-a-time. values: for listed, one row for each
+    sample, shape (samples, random axes) [units of the axes]. cells: for listed, the combination of the values of the
+    gridded axes for each sample, shape (samples,), from 1, the last axis fastest; None: every sample has all
+    combinations. Raises InputError.
     """
 
     method: Annotated[str, Choice(METHODS)] = "latin-hypercube"
@@ -138,7 +140,7 @@ class Sampling:
             )
 
     def drawn(self, distributions: Sequence[Distribution]) -> Array:
-        """Values of axes with these distributions, shape (samples, axes) [units of the axes]. Raises InputError."""
+        """Values of the axes with these distributions, shape (samples, axes) [units of the axes]. Raises InputError."""
         count = len(distributions)
         if self.values is not None:
             if any(len(row) != count for row in self.values):
@@ -153,7 +155,7 @@ class Sampling:
         return values_at(self.shares(count), distributions)
 
     def shares(self, axes: int) -> Array:
-        """Shares of the distributions, ndarray, shape (samples, axes), [-], in (0, 1); equal for equal seeds."""
+        """Cumulative probabilities in (0, 1), ndarray, shape (samples, axes), [-]; equal for equal seeds."""
         if not axes:
             return np.zeros((1, 0))
         from scipy.stats import qmc
@@ -184,13 +186,13 @@ class Sampling:
 
 
 def values_at(shares: Array, distributions: Sequence[Distribution]) -> Array:
-    """The values below which these shares of the distributions lie, shape (samples, axes) [units of the axes]."""
+    """Quantiles of the distributions at probabilities `shares`, shape (samples, axes) [units of the axes]."""
     inside = np.clip(shares, *WITHIN)
-    return np.column_stack([one.values(inside[:, index]) for index, one in enumerate(distributions)])
+    return np.column_stack([of_axis.values(inside[:, index]) for index, of_axis in enumerate(distributions)])
 
 
 def distribution_from(table: Mapping[str, Any]) -> tuple[Distribution, set[str]]:
-    """The distribution of the table of an axis, and the keys that it takes. Raises InputError."""
+    """The distribution in the table of an axis, and the keys of the table that define it. Raises InputError."""
     kind = table["distribution"]
     if not isinstance(kind, str) or kind not in DISTRIBUTIONS:
         raise InputError(f"distribution = {kind!r}: give one of {', '.join(map(repr, DISTRIBUTIONS))}")
@@ -215,7 +217,7 @@ Table = dict[str, Any]
 KEYS = ("sets", "multiplies", "factors", "surfaces", "values", "labels", "range", "points", "spacing", "distribution")
 RESERVED = ("run", "status", "message")
 SPACINGS = ("linear", "log")
-MOST_VALUES = 10_000  # of one axis; workers receive them all
+MOST_VALUES = 10_000  # of one axis; workers receive all values
 
 
 @dataclass(frozen=True)
@@ -223,14 +225,14 @@ class Axis:
     """One axis of a study.
 
     Attributes:
-        name: of its column in the table.
+        name: of the axis and of its column in the table.
         change: what a value does to the scene: "sets" fields, "multiplies" fields, selects the case of a table of
-            lambda "factors", selects a "record", scales it ("scale"), or nothing ("free").
+            lambda "factors", selects a "record", scales the record ("scale"), or nothing ("free").
         paths: the fields, such as `bearing.friction`; for "factors" the table of factors.
-        surfaces: of these surfaces only (1..n-1); None: of all.
-        values: of a grid; None for a random axis.
-        labels: the values in the column of the table, all numbers or all texts.
-        distribution: of a random axis; None for a grid.
+        surfaces: numbers of the surfaces (1..n-1) that the axis changes; None: all.
+        values: of a gridded axis; None for a random axis.
+        labels: the values as the column of the table shows them, all numbers or all texts.
+        distribution: of a random axis; None for a gridded axis.
     """
 
     name: str
@@ -253,7 +255,10 @@ class Axis:
 
 
 def axis_from(name: str, table: Any, folder: Path | None) -> Axis:
-    """The axis of a table `[axes.NAME]` of a study file in a folder. Raises InputError that starts with `axes.NAME`."""
+    """The axis of the table `[axes.NAME]` of a study file. folder: of the file, to which paths are relative.
+
+    Raises InputError that starts with `axes.NAME`.
+    """
     path = f"axes.{name}"
     if not isinstance(table, Mapping):
         raise InputError(f"{path} = {table!r}: give a table, such as sets = 'bearing.friction', values = [0.05, 0.08]")
@@ -274,6 +279,7 @@ def axis_from(name: str, table: Any, folder: Path | None) -> Axis:
 
 
 def _change(table: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
+    """`change` and `paths` of the axis of a table."""
     changes = [key for key in ("sets", "multiplies", "factors") if key in table]
     if len(changes) > 1:
         raise InputError(f"{changes[1]}: not together with {changes[0]}; use one axis for each")
@@ -296,7 +302,7 @@ def _surfaces(table: Mapping[str, Any]) -> tuple[int, ...] | None:
 
 
 def _with_values(axis: Axis, table: Mapping[str, Any]) -> tuple[Axis, set[str]]:
-    """The axis with its values or its distribution, and the keys of the table that give them."""
+    """The axis with its values or its distribution, and the keys of the table that define these."""
     if "distribution" in table:
         distribution, used = distribution_from(table)
         return replace(axis, distribution=distribution), used
@@ -310,7 +316,7 @@ def _with_values(axis: Axis, table: Mapping[str, Any]) -> tuple[Axis, set[str]]:
 
 
 def grid(axis: Axis, values: Any, labels: Any = None) -> Axis:
-    """The axis with these values. Raises InputError."""
+    """The axis with a list of values and, unless None, a list of labels. Raises InputError."""
     if not isinstance(values, list) or not values or len(values) > MOST_VALUES:
         raise InputError(f"values = {_short(values)}: give a list of 1 to {MOST_VALUES} values")
     if len({json.dumps(value, default=str) for value in values}) < len(values):
@@ -321,12 +327,12 @@ def grid(axis: Axis, values: Any, labels: Any = None) -> Axis:
     if all(isinstance(label, int | float) and not isinstance(label, bool) for label in labels):
         shown: tuple[Any, ...] = tuple(map(float, labels))
     else:
-        shown = tuple(str(one) if isinstance(one, str | int | float) else json.dumps(one) for one in labels)
+        shown = tuple(str(label) if isinstance(label, str | int | float) else json.dumps(label) for label in labels)
     return replace(axis, values=tuple(values), labels=shown)
 
 
 def located(axis: Axis, folder: Path | None) -> Axis:
-    """The axis with absolute paths of the files that its values name, relative to a folder. Raises InputError."""
+    """The axis with absolute paths where its values name files relative to a folder. Raises InputError."""
     if axis.change != "sets" or axis.values is None:
         return axis
     values = axis.values
@@ -336,6 +342,7 @@ def located(axis: Axis, folder: Path | None) -> Axis:
 
 
 def _range(table: Mapping[str, Any]) -> list[float]:
+    """The values of the keys `range`, `points` and `spacing`."""
     value, points, spacing = table["range"], table.get("points"), table.get("spacing", "linear")
     if not isinstance(value, list) or len(value) != 2:
         raise InputError(f"range = {value!r}: give the first and the last value")
@@ -360,14 +367,14 @@ INTENSITY = "intensity"  # column of the intensity measure of [records]
 
 @dataclass(frozen=True)
 class Recipe:
-    """How the scenes of a study are made; small, so that it travels to workers.
+    """All that a worker needs to make the scenes of a study; small, since it is sent to every worker.
 
     Attributes:
-        scene: table of the base scene; paths in it are absolute.
+        scene: table of the base scene, with absolute paths.
         axes: in the order of the columns.
         records: name -> `[motion]` table, without its key `kind`.
         factors: name in the study file -> table of lambda factors.
-        intensities: name of a record -> its intensity measure at scale 1 [m/s^2]; empty where none is asked for.
+        intensities: name of a record -> intensity measure at scale 1 [m/s^2]; empty for a study without intensity.
     """
 
     scene: Table
@@ -377,22 +384,25 @@ class Recipe:
     intensities: dict[str, float]
 
     def intensity(self, at: Mapping[str, Any]) -> dict[str, float]:
-        """The intensity measure of a run under its name [m/s^2]; empty where none is asked for. at: axis -> value."""
+        """INTENSITY -> the intensity measure of a run [m/s^2]; empty for a study without. at: axis -> value."""
         if not self.intensities:
             return {}
         return {INTENSITY: self.intensities[at["record"]] * at.get("scale", 1.0)}
 
 
 def motion_of(record: Table) -> Table:
-    """The `[motion]` table of a scene, of a record."""
+    """The `[motion]` table of a scene that runs a record."""
     return {"kind": RecordMotion.kind, **record}
 
 
 class SceneFactory:
-    """Makes the scenes of a study: each is what the reader of scene files makes of the table of the run.
+    """Makes the scenes of a study: writes the values of a run into the table of the base scene, and reads that table.
 
-    A motion that no axis changes is resolved once; what is made of other motions and of the frame of a building is kept
-    by the reader.
+    A motion that no axis changes is read once. The reader of scene files caches other motions and frames of buildings.
+
+    Attributes:
+        recipe: of the study.
+        base: the base scene, at full fidelity.
     """
 
     def __init__(self, recipe: Recipe) -> None:
@@ -401,38 +411,38 @@ class SceneFactory:
         base = {key: value for key, value in recipe.scene.items() if key != "fidelity"}
         self.base = scene_of(base)
         reduced(self.base, self._fidelity)  # raises its errors
-        self._setting = sorted(  # a table before its fields
+        self._set_paths = sorted(  # (depth, index of the axis, path): a table is set before its fields
             (len(keys_of(path)), index, path)
             for index, axis in enumerate(recipe.axes)
             for path in axis.paths
             if axis.change == "sets"
         )
         changed = {path.partition(".")[0] for axis in recipe.axes for path in axis.paths}
-        self._given: Table = {}
+        self._fixed: Table = {}  # parts of every scene that are read already
         if not recipe.records and "motion" not in changed:
-            self._given["motion"] = self.base.motion
+            self._fixed["motion"] = self.base.motion
             if isinstance(self.base, Scene):
-                self._given["motion_table"] = self.base.motion_table
-        self._table = {key: value for key, value in base.items() if key not in self._given}
+                self._fixed["motion_table"] = self.base.motion_table
+        self._table = {key: value for key, value in base.items() if key not in self._fixed}
 
     def scene(self, values: Sequence[Any]) -> AnyScene:
-        """The scene of one value for each axis, in their order. Raises InputError."""
+        """The scene of a run. values: one for each axis, in the order of the axes. Raises InputError."""
         axes, table = self.recipe.axes, self._table
-        for _, index, path in self._setting:
+        for _, index, path in self._set_paths:
             table = changed_table(table, {path: values[index]}, axes[index].surfaces)
-        chosen = list(zip(axes, values, strict=True))
-        for axis, value in chosen:
+        pairs = list(zip(axes, values, strict=True))
+        for axis, value in pairs:
             if axis.change == "record":
-                scale = next((number for axis, number in chosen if axis.change == "scale"), 1.0)
+                scale = next((number for axis, number in pairs if axis.change == "scale"), 1.0)
                 table = {**table, "motion": motion_of(self._scaled(value, scale))}
             for path in axis.paths if axis.change == "multiplies" else ():
                 table = multiplied_table(table, path, value, axis.surfaces)
-        word: Any = table.get("fidelity", self._fidelity)
-        scene = scene_of({key: value for key, value in table.items() if key != "fidelity"}, **self._given)
-        for axis, value in chosen:
+        level: Any = table.get("fidelity", self._fidelity)
+        scene = scene_of({key: value for key, value in table.items() if key != "fidelity"}, **self._fixed)
+        for axis, value in pairs:
             if axis.change == "factors":
                 scene = bounded_scene(scene, self.recipe.factors[axis.paths[0]], value)
-        return reduced(scene, word)
+        return reduced(scene, level)
 
     def _scaled(self, name: str, factor: float) -> Table:
         """The `[motion]` table of a record times a factor."""
@@ -441,5 +451,5 @@ class SceneFactory:
             raise InputError(f"scale = {factor:g}: give a number above 0")
         if factor == 1.0:
             return table
-        whole = float(RecordMotion(**table).build().metadata["scale"]) * factor
-        return {**{key: value for key, value in table.items() if key not in ("scale", "scale_to")}, "scale": whole}
+        scale = float(RecordMotion(**table).build().metadata["scale"]) * factor
+        return {**{key: value for key, value in table.items() if key not in ("scale", "scale_to")}, "scale": scale}

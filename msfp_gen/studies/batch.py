@@ -1,7 +1,7 @@
-"""Many runs at the same time: pools of workers, and batches of scenes, each run as by `simulate` (docs/batch.md).
+"""Pools of workers, and batches of scenes: scenes come in, results go out as the runs end (docs/batch.md).
 
-Pools are threads and processes of this machine, an executor of the caller, Dask, MPI: every one is an executor in the
-sense of `concurrent.futures`.
+Studies run their chunks on the same pools. A pool is an executor in the sense of `concurrent.futures`: threads or
+processes of this machine, an executor of the caller, Dask or MPI.
 """
 
 from __future__ import annotations
@@ -40,27 +40,27 @@ from msfp_gen.studies.estimation.backbone_run import check_backbone, run_backbon
 
 T = TypeVar("T")
 S = TypeVar("S")
-AHEAD = 2  # calls that wait for each worker, so that none is idle
-CONNECT = "20s"  # until a Dask scheduler must have answered
-UNKNOWN = 64  # workers of an executor that does not say how many it has
-Proceed = Callable[[float, float], None]
+AHEAD = 2  # calls in flight for each worker, so that no worker is idle
+CONNECT = "20s"  # time in which a Dask scheduler must answer
+UNKNOWN = 64  # workers that are assumed of an executor that does not state their number
+Proceed = Callable[[float, float], None]  # (simulated time, end), or (share done, 1)
 ENDED = ("ok", "stopped")  # statuses of runs that did not fail
 BAD_INPUT, OUT_OF_TIME = "input", "limit"  # statuses that only runs of studies have
 
 
 @dataclass(frozen=True)
 class Pool:
-    """An executor, how many calls it may have at the same time, and a word for messages."""
+    """An executor. in_flight: number of calls that it may hold at the same time. word: its name in messages."""
 
     executor: Executor
     in_flight: Callable[[], int]
     word: str
 
     def results(self, function: Callable[..., T], calls: Iterable[tuple[S, tuple[Any, ...]]]) -> Iterator[tuple[S, T]]:
-        """Call `function` with the arguments of each call; its key and returned value, in the order of completion.
+        """Call `function` on the workers; yields the key of each call and the returned value, in order of completion.
 
-        Only a few calls for each worker are made ahead, so that memory does not grow with their number. Raises RunError
-        where workers died.
+        calls: (key, arguments). Few calls for each worker are in flight, so that memory does not grow with the number
+        of calls. Raises RunError where workers died.
         """
         pending: dict[Future[T], S] = {}
         try:
@@ -120,7 +120,7 @@ _worker = threading.local()  # attribute `stop`: the flag that ends the runs of 
 
 
 def _start_worker(stop: _Flag, own_process: bool) -> None:
-    """Called by the executor in each new thread or process."""
+    """Prepare a new thread or process of a pool; its executor calls this. stop: set where the runs must end."""
     _worker.stop = stop
     if own_process:  # a terminal sends Ctrl-C to all processes, but only the main process handles it
         signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -128,23 +128,24 @@ def _start_worker(stop: _Flag, own_process: bool) -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process when its parent dies, even by `kill -9`: it would wait for work for ever."""
+    """End this process when its parent dies, even by `kill -9`; otherwise it would wait for work for ever."""
     if (parent := multiprocessing.parent_process()) is not None:
         parent.join()
         os._exit(1)
 
 
 def raise_if_stopped(_: float, __: float) -> None:
-    """The `progress` callback of a run in a worker: ends the run once the flag is set. Elsewhere it does nothing."""
+    """The `progress` callback of a run: ends the run once the flag of its worker is set; does nothing elsewhere."""
     stop: _Flag | None = getattr(_worker, "stop", None)
     if stop is not None and stop.is_set():
         raise _StoppedError
 
 
 class SharedProgress:
-    """Progress of runs at the same time, in threads: the mean of their shares, with 1 for all.
+    """Progress of a batch in threads.
 
-    report: called by one thread at a time; an exception in it ends the runs.
+    report: called with the mean share that the runs have done, and 1, by one thread at a time; an exception in it ends
+    the runs.
     """
 
     def __init__(self, runs: int, report: Callable[[float, float], None] | None) -> None:
@@ -153,7 +154,7 @@ class SharedProgress:
         self._lock = threading.Lock()
 
     def of(self, run: int) -> Callable[[float, float], None]:
-        """The `progress` callback of one of the runs, in a worker; it ends the run as `raise_if_stopped` does."""
+        """The `progress` callback of a run by its index; it also ends the run as `raise_if_stopped` does."""
 
         def update(reached: float, end: float) -> None:
             raise_if_stopped(reached, end)
@@ -172,12 +173,12 @@ def pool_from(
     dask: str | None = None,
     mpi: bool = False,
 ) -> AbstractContextManager[Pool]:
-    """The pool of these arguments of `study`. Raises InputError where they name two."""
-    choices = {"executor": executor, "dask": dask, "mpi": mpi, "threads": threads}
-    named = [name for name, value in choices.items() if value]
+    """The pool for these arguments, as of `study`. Raises InputError where they name two engines."""
+    engines = {"executor": executor, "dask": dask, "mpi": mpi, "threads": threads}
+    named = [name for name, value in engines.items() if value]
     if len(named) > 1:
         raise InputError(f"{named[0]} and {named[1]}: give one engine")
-    if executor is not None:  # of the caller: it stays open
+    if executor is not None:  # the caller closes it
         count = worker_count(workers) if workers is not None else getattr(executor, "_max_workers", UNKNOWN)
         return nullcontext(Pool(executor, lambda: AHEAD * count, type(executor).__name__))
     if dask is not None:
@@ -187,7 +188,10 @@ def pool_from(
 
 @contextmanager
 def local_pool(workers: int | None = None, processes: bool = False) -> Iterator[Pool]:
-    """Threads, or processes, of this machine; None: one for each core. Leaving the block by an error ends all runs."""
+    """Threads or processes of this machine. Leaving the block by an error ends all runs.
+
+    workers: their number; None: one for each core. Raises InputError.
+    """
     count = worker_count(workers)
     stop: _Flag
     executor: Executor
@@ -209,7 +213,7 @@ def local_pool(workers: int | None = None, processes: bool = False) -> Iterator[
 
 @contextmanager
 def dask_pool(address: str) -> Iterator[Pool]:
-    """Workers of a Dask cluster: the address of its scheduler, or a scheduler file. Raises InputError, RunError."""
+    """Workers of a Dask cluster. address: of its scheduler, or a scheduler file. Raises InputError, RunError."""
     require("distributed", "dask", "--dask")
     from distributed import Client
 
@@ -221,7 +225,7 @@ def dask_pool(address: str) -> Iterator[Pool]:
             f"--dask = {address!r}: no scheduler answers there ({error}); start one: dask scheduler"
         ) from None
     try:
-        # More workers may join later. The scheduler gives the calls of a worker that died to others.
+        # More workers may join later. The scheduler gives the calls of a worker that died to other workers.
         executor = client.get_executor(pure=False)
         yield Pool(executor, lambda: AHEAD * max(1, sum(client.ncores().values())), f"Dask at {address}")
     finally:
@@ -230,7 +234,7 @@ def dask_pool(address: str) -> Iterator[Pool]:
 
 @contextmanager
 def mpi_pool() -> Iterator[Pool]:
-    """The other processes of `mpiexec -n N python -m mpi4py.futures -m msfp_gen ...`. Raises InputError."""
+    """The worker processes of `mpiexec -n N python -m mpi4py.futures -m msfp_gen ...`. Raises InputError."""
     require("mpi4py", "mpi", "--mpi")
     try:
         from mpi4py import MPI
@@ -265,9 +269,9 @@ def simulate_batch(
     strict: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Any]:
-    """Integrate many scenes at the same time; every result is bit by bit that of `simulate`.
+    """Integrate many scenes at the same time; every result is equal to the result of `simulate`, bit by bit.
 
-    The models of all are built before the first run starts. Ctrl-C ends all runs within a few thousand steps.
+    All models are built before the first run starts. Ctrl-C ends all runs within a few thousand steps.
 
     Args:
         scenes: the scenes; all of their fields may differ.
@@ -275,14 +279,14 @@ def simulate_batch(
         processes: use processes instead of threads: faster for short runs, where assembling the result in Python takes
             longer than the integration in C. A script must then make this call under `if __name__ == "__main__":`.
         strict: as in `simulate`.
-        progress: called in the thread of the caller with the number of completed scenes, and of all scenes.
+        progress: called in the thread of the caller with the number of completed scenes and the number of all scenes.
 
     Returns a list of Result, or of BuildingResult for buildings, in the order of the scenes. A run that fails raises no
     error: its `status` and `message` describe the failure, and its history has the rows until then.
 
-    Raises InputError: an entry is no scene, or its method does not support its effects; the message starts with its
-    index, as in `scenes[3]`; or the rows of all do not fit into memory. No scene is run. RunError: a scene failed at
-    its start, so that it has no rows, or a worker process died. The other runs are ended.
+    Raises InputError before any run: an entry is no scene, its method does not support its effects (the message starts
+    with the index, as in `scenes[3]`), or the rows of all runs do not fit into memory. RunError: a scene failed at its
+    start, so that it has no rows, or a worker process died; the other runs are ended.
     """
     if isinstance(scenes, Scene | BuildingScene):
         raise InputError("scenes: this is one scene; give a list of them")
@@ -315,13 +319,13 @@ def completed_runs(
 ) -> Generator[tuple[int, Any], None, None]:
     """Run scenes at the same time; yields (index, result) in the order in which the runs end.
 
-    Arguments and results are those of `simulate_batch`, but the result of a run that failed before its first row is
-    its RunError, and no result is kept, so that the rows of all need not fit into memory. Closing the iterator, or an
-    exception in its consumer (use `contextlib.closing`), ends the other runs. Raises InputError before the first run,
-    and RunError where a worker process died.
+    Arguments and results are as in `simulate_batch`, with two differences. The result of a run that failed before its
+    first row is its RunError. No result is kept, so that the rows of all runs need not fit into memory. Closing the
+    iterator, or an exception in its consumer (use `contextlib.closing`), ends the other runs. Raises InputError before
+    the first run, and RunError where a worker process died.
 
-    labels: of the scenes in messages; None: their names. progress: of all runs, called in their threads with the share
-    that is done, and 1; not with processes.
+    labels: of the scenes in messages; None: the names of the scenes. progress: as `report` of `SharedProgress`; not
+    with processes.
     """
     count = worker_count(workers)
     labels = [scene.name for scene in scenes] if labels is None else labels
@@ -347,29 +351,29 @@ def completed_runs(
 
 
 def check_method(scene: AnyScene) -> None:
-    """Raise InputError where the method, or the level "backbone", does not run a scene; that of a building runs any."""
-    if scene.fidelity == "backbone":  # which selects no effects
+    """Raise InputError where the method, or the model "backbone", does not run a scene; a building needs no check."""
+    if scene.fidelity == "backbone":
         check_backbone(scene)
     elif isinstance(scene, Scene):
         check(scene, scene.modelled)
 
 
 def build_models(scenes: Iterable[AnyScene]) -> None:
-    """Build the models with which these scenes start, unless the cache of this host has them; a backbone has none."""
+    """Build the compiled models with which scenes start, where the cache of this host lacks them."""
     for spec in dict.fromkeys(spec for scene in scenes if scene.fidelity != "backbone" for spec in scene.specs):
         build_model(spec.layout, spec.effects)
 
 
 class _OutOfTime(KeyboardInterrupt):
-    """Ends a run as Ctrl-C does, so that its result has the rows until then."""
+    """Ends a run in the way of Ctrl-C, so that its result has the rows until then."""
 
 
 def run_to_end(
     scene: AnyScene, *, progress: Proceed = raise_if_stopped, seconds: float | None = None, **options: Any
 ) -> Any:
-    """The result of a run of any scene, also of one that fails: here runs of studies start.
+    """Run one scene of a batch or a study; a run that fails after its first row returns its result too.
 
-    progress, options: of `simulate`. seconds: wall time of the run at most [s]; None: no limit. Raises InputError as
+    progress, options: of `simulate`. seconds: longest wall time of the run [s]; None: no limit. Raises InputError as
     `simulate`; RunError: there are no rows, or the time is over (status "limit"; `.result` has the rows until then).
     """
     if scene.fidelity == "backbone":
@@ -397,7 +401,7 @@ def run_to_end(
 
 @contextmanager
 def _located(label: str) -> Iterator[None]:
-    """Start the messages of errors of a scene with its label."""
+    """Let the message of every error of a scene start with the label of the scene."""
     try:
         yield
     except InputError as error:
@@ -407,12 +411,12 @@ def _located(label: str) -> Iterator[None]:
 
 
 def _run(label: str, scene: AnyScene, strict: bool, proceed: Proceed | None, threads: int) -> Any:
-    """One run of a batch, in a worker; a RunError if it has no rows."""
+    """The result of one run of a batch, in a worker; its RunError if it has no rows."""
     try:
         with _located(label):
             options = {"strict": strict} if isinstance(scene, Scene) else {"threads": threads}
             return run_to_end(scene, progress=proceed or raise_if_stopped, **options)
     except RunError as error:
         return error
-    except InputError as error:  # such as rows for which other runs leave no memory
+    except InputError as error:  # such as: other runs leave no memory for its rows
         return RunError(str(error), status=BAD_INPUT)

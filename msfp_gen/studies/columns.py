@@ -1,6 +1,7 @@
-"""Quantities of runs for tables, studies and bounds: names, units, where a result has them; what a study keeps.
+"""The quantities of a run that tables, studies and bounds report: names, units, and places in a result.
 
-A study keeps columns of summary and characterisation, peaks of any history, and formulas of them.
+A result comes in and one row of a table goes out. A study keeps quantities of the summary and of the characterisation,
+extremes of columns of the history, and formulas of these (`Keep`).
 """
 
 from __future__ import annotations
@@ -30,9 +31,10 @@ if TYPE_CHECKING:
 class Quantity(NamedTuple):
     """A quantity of a run.
 
-    path: dotted, in the summary, or in the characterisation where `characterised`; `.*` stands for each surface, floor,
-    storey or bearing, bottom first or in the order of the file, and gives a column for each. governs: whether its
-    largest or its least value governs a design; "" if neither does. at_rest: defined where the run ends at rest.
+    path: dotted path of the value in the summary, or in the characterisation if `characterised`; `.*` stands for each
+    surface, floor, storey or bearing, bottom first or in the order of the file, and gives one column for each. governs:
+    whether the largest or the least value governs a design; "" if neither does. at_rest: whether the quantity is
+    defined only if the run ends at rest.
     """
 
     unit: str
@@ -58,7 +60,7 @@ RUN = {
     "secant_stiffness": Quantity("N/m", "secant_stiffness", characterised=True),
     "energy_dissipated": Quantity("J", "energy_dissipated", characterised=True),
     "residual_displacement": Quantity("m", "residual_displacement", "most", characterised=True, at_rest=True),
-    # of cycles, their mean
+    # means over the cycles
     "effective_stiffness": Quantity("N/m", "envelope.effective_stiffness.mean", characterised=True),
     "effective_period": Quantity("s", "envelope.effective_period.mean", characterised=True),
     "effective_damping": Quantity("", "envelope.effective_damping.mean", characterised=True),
@@ -110,25 +112,31 @@ MOVING = "the run ends while the bearing still moves: give motion.hold, such as 
 
 
 class Source(NamedTuple):
-    """A quantity, or that of one surface, floor, storey or bearing, by its place from 0; part: the name of that one."""
+    """Where the value of a column comes from: a quantity of the run, or of one of its parts.
+
+    place: index from 0 of the surface, floor, storey or bearing; None: of the run. part: name of that part in messages.
+    """
 
     quantity: Quantity
     place: int | None = None
     part: str = ""
 
     def reason(self, characterisation: Any) -> str:
-        """Why a run that was characterised has no value; "" where no reason is known."""
+        """Why a characterised run has no value of the quantity; "" where no reason is known."""
         rests = getattr(characterisation, "at_rest", True)
         return "" if rests or not self.quantity.at_rest else MOVING
 
     @property
     def compared(self) -> bool:
-        """Whether `bound` compares it; quantities of parts of a building are only in its suites."""
+        """Whether `bound` compares the quantity; quantities of parts of a building are compared in suites only."""
         of_part = self.quantity.path.partition(".*")[0] in ("floors", "storeys", "bearings")
         return not of_part and (self.quantity.characterised or bool(self.quantity.governs))
 
     def value(self, summary: Mapping[str, Any], characterisation: Any) -> Any:
-        """Its value; None where the run has none. characterisation: None where it is not needed, or not possible."""
+        """The value of the quantity; None where the run has none.
+
+        characterisation: of the run; None where it is not needed, or not possible.
+        """
         quantity = self.quantity
         if quantity.at_rest and not getattr(characterisation, "at_rest", False):
             return None
@@ -139,7 +147,10 @@ class Source(NamedTuple):
 
 
 class Counts(NamedTuple):
-    """What quantities of a scene there is one of each: the most surfaces of any bearing, and parts of a building."""
+    """Number of columns for a quantity of each kind of part: surfaces (the most of any bearing), parts of a building.
+
+    A scene of one bearing has no floors, storeys and bearings.
+    """
 
     surfaces: int = 0
     floors: int = 0
@@ -148,20 +159,20 @@ class Counts(NamedTuple):
 
     @classmethod
     def of(cls, scene: AnyScene) -> Counts:
-        """Those of a scene; of one bearing there is no building."""
+        """The counts of a scene."""
         surfaces = max(len(bearing.surfaces) for bearing in scene.every_bearing)
         if not isinstance(scene, BuildingScene):
             return cls(surfaces)
         return cls(surfaces, len(scene.building.nodes), len(scene.building.columns), len(scene.bearings))
 
     def or_more(self, other: Counts) -> Counts:
-        """The larger of each."""
+        """The larger count of each kind of part."""
         return Counts(*map(max, self, other))
 
 
 @lru_cache(maxsize=16)
 def catalogue(counts: Counts) -> dict[str, Source]:
-    """Column -> where it comes from, of a bearing or of a building."""
+    """Column -> where its value comes from, for a bearing or for a building."""
     sources: dict[str, Source] = {}
     for name, quantity in (BUILDING if counts.bearings else BEARING).items():
         head, several, _ = quantity.path.partition(".*")
@@ -174,7 +185,7 @@ def catalogue(counts: Counts) -> dict[str, Source]:
 
 
 def value_at(table: Any, path: str) -> Any:
-    """The value at a dotted path of keys or attributes, None without it; `*` gives a list of the values of all rows."""
+    """The value at a dotted path of keys or attributes, None where there is none; `*` gives a list over all rows."""
     value = table
     head, several, rest = path.partition(".*")
     for part in head.split("."):
@@ -185,20 +196,20 @@ def value_at(table: Any, path: str) -> Any:
 
 
 def plain_cell(value: Any) -> Any:
-    """A value of a cell: lists of whole numbers separated by spaces (`rims_met`), other lists and tables as JSON."""
+    """A value for a cell of a table: a list of whole numbers (`rims_met`) with spaces, other collections as JSON."""
     if isinstance(value, list) and all(type(item) is int for item in value):
         return " ".join(map(str, value))
     return json.dumps(value, default=str) if isinstance(value, list | tuple | dict) else value
 
 
-# Word in a formula -> what it takes of a column of the history.
+# Word in a formula -> function of a column of the history.
 EXTREMES: dict[str, Callable[[Any], Any]] = {
     "peak": lambda values: np.abs(values).max(),
     "least": np.min,
     "most": np.max,
     "last": lambda values: values[-1],
 }
-# Word and field of the history -> the extreme over all steps of a run that is the same quantity.
+# (word, field of the history) -> field of `Extremes` with the same quantity over all steps of a run.
 _OVER_STEPS = {
     ("peak", "displacement"): "displacement",
     ("peak", "top_force"): "top_force",
@@ -212,7 +223,7 @@ _OVER_STEPS = {
     ("most", "temperature"): "temperature",
 }
 _EXTREME = re.compile(rf"\b({'|'.join(EXTREMES)})\(\s*([^()]*?)\s*\)")
-CAPACITY_USED = "capacity_used"  # 1 - least gap / capacity: 1 where a slider meets its rim
+CAPACITY_USED = "capacity_used"  # 1 - minimum gap / capacity; 1 where a slider meets its rim
 TEXTS = ("rims_met", "verdict", "limits_exceeded")
 _CAPACITY_USED = Quantity("", CAPACITY_USED)
 _LEFT_OUT = ("status", "message")  # every row has them
@@ -229,14 +240,14 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Keep:
-    """What is kept of each run.
+    """The columns that a study keeps of each run.
 
     Attributes:
         names: quantities, as in the study file.
-        formulas: pairs of a name and a formula of quantities, axes, and `peak(...)`, `least(...)`, `most(...)`,
-            `last(...)` of a column of the history: over all steps where the run records them, else of the rows.
+        formulas: (name, formula). A formula has quantities, axes, and `peak(...)`, `least(...)`, `most(...)`,
+            `last(...)` of a column of the history: over all steps if the run records these, else over the rows.
         axes: names of the axes that hold numbers.
-        counts: the most of any scene of the study.
+        counts: the largest of any scene of the study.
         history: columns of the history, as in an exported file.
     """
 
@@ -248,7 +259,7 @@ class Keep:
 
     @cached_property
     def known(self) -> dict[str, Source]:
-        """Column -> where it comes from, of everything that can be kept."""
+        """Column -> where its value comes from, for all columns that a study can keep."""
         sources = {name: source for name, source in catalogue(self.counts).items() if name not in _LEFT_OUT}
         if not self.counts.bearings:
             sources |= {f"{CAPACITY_USED}_{k + 1}": Source(_CAPACITY_USED, k) for k in range(self.counts.surfaces)}
@@ -256,7 +267,7 @@ class Keep:
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """The columns, in the order of the study file. Raises InputError: an unknown quantity, or no valid formula."""
+        """The columns, in the order of the study file. Raises InputError: unknown quantity, or invalid formula."""
         known, columns = self.known, []
         for name in self.names:
             columns_of_name = [key for key in known if key == name or re.fullmatch(rf"{re.escape(name)}_\d+", key)]
@@ -276,17 +287,18 @@ class Keep:
         return [column.name for column in self.columns if not column.text]
 
     def values(self, result: Any, at: Mapping[str, float]) -> tuple[dict[str, Any], str]:
-        """Column -> value, None where it is not defined; and a line about a characterisation that is not possible.
+        """Column -> value, None where undefined; and a line that says why there is no characterisation, "" if there is.
 
-        at: the values of the axes that hold numbers.
+        at: name -> value of the axes that hold numbers.
         """
-        reader, formulas, kept = _Reader(result, self), dict(self.formulas), {}
+        reader, formulas, row = _Reader(result, self), dict(self.formulas), {}
         for name, _, _ in self.columns:
             text = formulas.get(name)
-            kept[name] = reader.value(name) if text is None else self._evaluated(name, text, reader, at)
-        return kept, reader.problem
+            row[name] = reader.value(name) if text is None else self._formula_value(name, text, reader, at)
+        return row, reader.problem
 
-    def _evaluated(self, name: str, text: str, reader: _Reader, at: Mapping[str, float]) -> float | None:
+    def _formula_value(self, name: str, text: str, reader: _Reader, at: Mapping[str, float]) -> float | None:
+        """The value of a formula; None where one of its quantities, or the formula, has none."""
         tree, extremes = _tree(self, name, text)
         values: dict[str, float] = {}
         for symbol in formula.names_in(tree):
@@ -303,7 +315,7 @@ class Keep:
 
 @lru_cache(maxsize=64)
 def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[str, str]]]:
-    """Syntax tree of a formula, and the extremes in it: symbol -> (word, column of the history)."""
+    """Syntax tree of a formula, and the extremes in the formula: symbol -> (word, column of the history)."""
     columns, extremes = keep.history, dict[str, tuple[str, str]]()
 
     def symbol(match: re.Match[str]) -> str:
@@ -333,7 +345,10 @@ def _finite(value: Any) -> float | None:
 
 
 class _Reader:
-    """Reads quantities of one run; its summary and its characterisation are made when they are first needed."""
+    """Reads quantities of one run; summary and characterisation are computed when first needed.
+
+    problem: why a quantity of the characterisation has no value; "" where none was missing.
+    """
 
     def __init__(self, result: Any, keep: Keep) -> None:
         self.result = result
@@ -357,9 +372,9 @@ class _Reader:
         return None if value is None else _finite(value)
 
     def extreme(self, word: str, column: str) -> float | None:
-        """An extreme of a column of the history; None where the run has no such column.
+        """An extreme of a column of the history, over all steps if the run records these, else over the rows.
 
-        Over all steps where the run records it, else of the rows.
+        None where the run has no such column.
         """
         if column not in self._columns:
             return None
@@ -380,7 +395,7 @@ class _Reader:
 
     @cached_property
     def _characterisation(self) -> Any:
-        """None, and the problem, where it is not possible."""
+        """The characterisation of the run; None, with the reason in `problem`, where it is not possible."""
         try:
             return self.result.characterise()
         except InputError as error:

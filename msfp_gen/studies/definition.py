@@ -1,4 +1,8 @@
-"""`Study`: the definition of a study, from a file (TOML) or a table, complete and checked before the first run."""
+"""`Study`: the definition of a study, read from a TOML file or a table and checked before the first run.
+
+A study file comes in; axes, the base scene and the kept columns go out, as tasks of a pool (`Task`) and as the scene of
+any run.
+"""
 
 from __future__ import annotations
 
@@ -46,10 +50,10 @@ Table = dict[str, Any]
 Progress = Callable[[float, float], None]
 MOST_RUNS = 100_000_000
 
-TRIED = 1000  # numbers of one axis that are tried before the first run, at least; of texts and tables all
-PARTS = 64  # that a small study has at least, unless these would have fewer than LEAST runs
-LEAST, MOST = 8, 256  # runs of a chunk where the study file does not say
-OF_RECORDS = ("record", "scale")  # its axes, whether there are scales or not
+TRIED = 1000  # numbers of one axis that are tried before the first run, at least; texts and tables are all tried
+PARTS = 64  # parts of a study, at least, unless these would have fewer than LEAST runs
+LEAST, MOST = 8, 256  # runs of a chunk where the study file does not give `chunk`
+OF_RECORDS = ("record", "scale")  # names of axes that [records] reserves
 RECORD_KEYS = ("suite", "motions", "scales", "intensity")
 NOUN = "a table with motions or the file of a suite, and scales"
 COMPONENTS = ("E1", "E2", "E3", "geomean", "rotd50", "rotd100")
@@ -76,10 +80,10 @@ _CHUNK = Quantity("", least=1, whole=True)
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a study.
+    """Limits of a study: the table `[limits]` of a study file.
 
-    run_seconds: wall time of one run, after which it ends with status `limit` [s]. failures: runs that may fail; with
-    more the study ends, which keeps what is done. None: no limit. Raises InputError.
+    run_seconds: wall time after which a run ends with status `limit` [s]. failures: number of runs that may fail; one
+    more ends the study, whose finished parts are kept. None: no limit. Raises InputError.
     """
 
     run_seconds: Annotated[float | None, Quantity("s", above=0.0)] = None
@@ -91,12 +95,12 @@ class Limits:
 
 @dataclass(frozen=True)
 class Task:
-    """The runs of one chunk, as workers receive them.
+    """The runs of one chunk, as a worker receives them.
 
     Attributes:
         number: of the chunk, from 0.
-        first: index of its first run, from 0.
-        codes: of each grid axis, ndarray, shape (runs,): the indices of its values.
+        first: index of the first run, from 0.
+        codes: for each gridded axis the index of the value of every run, ndarray, shape (runs,).
         drawn: values of the random axes, ndarray, shape (runs, random axes), [units of the axes].
     """
 
@@ -109,7 +113,7 @@ class Task:
         return len(self.drawn)
 
     def rows(self, axes: Sequence[Axis]) -> list[tuple[tuple[Any, ...], tuple[Any, ...]]]:
-        """Of every run the values of the axes, and what the table shows for them."""
+        """(values of the axes, their labels in the table) of every run."""
         codes, drawn = iter(self.codes), iter(self.drawn.T)
         values: list[Sequence[Any]] = []
         labels: list[Sequence[Any]] = []
@@ -118,9 +122,9 @@ class Task:
                 values.append(next(drawn).tolist())
                 labels.append(values[-1])
             else:
-                chosen = next(codes).tolist()
-                values.append([axis.values[code] for code in chosen])
-                labels.append([axis.labels[code] for code in chosen])
+                indices = next(codes).tolist()
+                values.append([axis.values[index] for index in indices])
+                labels.append([axis.labels[index] for index in indices])
         if not axes:
             return [((), ())] * len(self)
         return list(zip(zip(*values, strict=True), zip(*labels, strict=True), strict=True))
@@ -133,14 +137,14 @@ class Study:
     Attributes:
         name: a label.
         recipe: base scene, axes and records.
-        sampling: how the random axes are drawn; None without random axes.
-        keep: the quantities of each run.
-        limits: of a run, and of the study.
-        given_chunk: runs of a chunk; None: from the number of runs.
-        table: the study as a plain table, complete: scene and records are in it.
-        files: path -> sha256 of every file that was opened to make the scenes of every value.
-        base: fingerprint of the scene of the first run, with the files that were opened for it.
-        opened: (index of an axis, index of its value) -> fingerprint of the files that were opened beyond these.
+        sampling: how the random axes are drawn; None for a study without random axes.
+        keep: the columns of each run.
+        limits: of a run and of the study.
+        given_chunk: runs of a chunk as given; None: `chunk` follows from the number of runs.
+        table: the study as a plain table that contains scene and records.
+        files: path -> sha256 of every file that was opened to make the scenes of all values.
+        base: fingerprint of the scene of the first run and of the files that were opened for this scene.
+        opened: (index of an axis, index of its value) -> fingerprint of the files that the value opens in addition.
     """
 
     name: str
@@ -161,28 +165,28 @@ class Study:
 
     @property
     def distributions(self) -> list[Distribution]:
-        """Those of the random axes."""
+        """The distributions of the random axes."""
         return [axis.distribution for axis in self.axes if axis.distribution is not None]
 
     @cached_property
     def samples(self) -> Array:
-        """Values of the random axes, ndarray, shape (samples, axes), [units of the axes]; one row without any."""
+        """Values of the random axes, ndarray, shape (samples, random axes), [units of the axes]; at least one row."""
         return np.zeros((1, 0)) if self.sampling is None else self.sampling.drawn(self.distributions)
 
     @cached_property
     def grid(self) -> tuple[int, ...]:
-        """Numbers of values of the axes that have some, slowest first."""
+        """Numbers of values of the gridded axes, slowest first."""
         return tuple(len(axis.values) for axis in self.axes if axis.values is not None)
 
     @cached_property
     def cells(self) -> np.ndarray[Any, np.dtype[np.intp]] | None:
-        """The combination of values of each sample, from 0, shape (samples,); None: every sample has all of them."""
+        """The combination of grid values of each sample, from 0, shape (samples,); None: each has all combinations."""
         cells = None if self.sampling is None else self.sampling.cells
         return None if cells is None else np.array(cells, dtype=np.intp) - 1
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Lengths of the grid of runs, slowest first: one for each axis with values, then the samples."""
+        """Lengths of the grid of runs, slowest first: of each gridded axis, then the number of samples."""
         return (len(self.samples),) if self.cells is not None else (*self.grid, len(self.samples))
 
     @property
@@ -212,7 +216,7 @@ class Study:
         return Task(number, first, tuple(codes), self.samples[sample])
 
     def scene(self, run: int) -> AnyScene:
-        """The scene of a run, numbered from 1 as in the table, to look at it alone. Raises InputError."""
+        """The scene of one run, by its number in the table, from 1. Raises InputError."""
         if not 1 <= run <= self.runs:
             raise InputError(f"run = {run}: give a number from 1 to {self.runs}")
         number, row = divmod(run - 1, self.chunk)
@@ -223,11 +227,11 @@ class Study:
 
 
 def check_study(study: Study) -> Study:
-    """The study with its quantities fitted to its bearings, and with the files that its scenes open. Raises InputError:
-    a value that a scene does not accept, names that occur twice, or too many runs.
+    """Check a study; returns it with the counts of its quantities and the files that its scenes open.
 
-    Every text and table among the values of a grid, and the least and the largest number of an axis, is tried in the
-    base scene.
+    Values of each axis are tried in the base scene: all texts and tables, and of numbers many, with the least and the
+    largest of a random axis. Raises InputError: a value that a scene does not accept, a name that occurs twice, or too
+    many runs.
     """
     if study.runs > MOST_RUNS:
         raise InputError(f"axes: {study.runs} runs; give at most {MOST_RUNS}")
@@ -242,11 +246,11 @@ def check_study(study: Study) -> Study:
         counts = Counts()
         columns: dict[str, None] = {}
         first, base, opened = {}, "", {}
-        for place, scene, files in _tried(study, factory):  # one after the other: their motions are long
+        for place, scene, files in _tried_scenes(study, factory):  # one scene in memory at a time: motions are long
             if place is None:
                 first, base = files, fingerprint((scene, sorted(files.values())))
-            elif own := sorted(digest for path, digest in files.items() if path not in first):
-                opened[place] = fingerprint(own)
+            elif additional := sorted(digest for path, digest in files.items() if path not in first):
+                opened[place] = fingerprint(additional)
             counts = counts.or_more(Counts.of(scene))
             if study.keep.formulas:
                 history = building_dataset if isinstance(scene, BuildingScene) else dataset
@@ -261,7 +265,7 @@ def check_study(study: Study) -> Study:
 
 
 def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:
-    """Raise InputError where an axis cannot change the base scene."""
+    """Raise InputError where an axis names a field or a surface that the base scene does not let it change."""
     for path in axis.paths if axis.change in ("sets", "multiplies") else ():
         if path.partition(".")[0] == "motion" and has_records:
             raise InputError(f"{axis.change} = {path!r}: [records] gives the motion; change it there")
@@ -276,14 +280,14 @@ def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:
             raise InputError(f"surfaces has {surface}: this bearing has surfaces 1 to {count}")
 
 
-def _tried(study: Study, factory: SceneFactory) -> Iterator[tuple[tuple[int, int] | None, AnyScene, Files]]:
-    """The scenes of the first run, and of every value of each axis with the first values of the others.
+def _tried_scenes(study: Study, factory: SceneFactory) -> Iterator[tuple[tuple[int, int] | None, AnyScene, Files]]:
+    """The scene of the first run, and for each tried value of an axis the scene with this value in the first run.
 
-    Yields the indices of the axis and of its value, None for the first run; the scene, and the files that it opened.
+    Yields (index of the axis, index of the value), None for the first run; the scene; and the files that it opened.
     """
     (base, _), *_ = study.task(0).rows(study.axes)
     named = ", ".join(f"{axis.name} = {value!r:.40}" for axis, value in zip(study.axes, base, strict=True))
-    yield None, *_made(factory, base, f"run 1 ({named})")
+    yield None, *_scene_and_files(factory, base, f"run 1 ({named})")
     drawn = iter(study.samples.T)
     for index, axis in enumerate(study.axes):
         if axis.values is None:
@@ -294,10 +298,11 @@ def _tried(study: Study, factory: SceneFactory) -> Iterator[tuple[tuple[int, int
             tried = list(enumerate(axis.values))[:: max(1, len(axis.values) // TRIED) if numeric else 1]
         for place, value in tried:
             changed = (*base[:index], value, *base[index + 1 :])
-            yield (index, place), *_made(factory, changed, f"axes.{axis.name}: value {value!r}")
+            yield (index, place), *_scene_and_files(factory, changed, f"axes.{axis.name}: value {value!r}")
 
 
-def _made(factory: SceneFactory, values: Sequence[Any], where: str) -> tuple[AnyScene, Files]:
+def _scene_and_files(factory: SceneFactory, values: Sequence[Any], where: str) -> tuple[AnyScene, Files]:
+    """The scene of values of the axes, and the files that were opened for it. Raises InputError that names `where`."""
     with prefixed(f"{where}: "):
         with recording() as files:
             scene = factory.scene(values)
@@ -306,7 +311,7 @@ def _made(factory: SceneFactory, values: Sequence[Any], where: str) -> tuple[Any
 
 
 def fields_of(table: Mapping[str, Any], key: str, kind: type, where: str = "") -> dict[str, Any]:
-    """The table at `key`, whose keys are fields of `kind`; empty if it is not there. Raises InputError."""
+    """The table at `key`, whose keys are fields of the dataclass `kind`; empty without `key`. Raises InputError."""
     inner = table.get(key, {})
     if not isinstance(inner, Mapping):
         raise InputError(f"{where}{key} = {inner!r}: give a table")
@@ -318,7 +323,7 @@ def fields_of(table: Mapping[str, Any], key: str, kind: type, where: str = "") -
 class Intensity:
     """The intensity measure of a record: spectral pseudo-acceleration, or peak ground acceleration without a period.
 
-    period [s], damping: of the oscillator. component: of the spectrum. Raises InputError.
+    period [s], damping [-]: of the oscillator. component: of the spectrum. Raises InputError.
     """
 
     period: Annotated[float | None, Quantity("s", above=0.0)] = None
@@ -329,7 +334,7 @@ class Intensity:
         check_fields(self, "records.intensity")
 
     def of(self, motion: Motion) -> float:
-        """The measure of a motion [m/s^2]."""
+        """The intensity measure of a motion [m/s^2]."""
         from msfp_gen.motions.records.spectrum import MEASURES, response_spectrum
 
         spectrum = response_spectrum(motion, [self.period or 1.0], damping=self.damping)
@@ -340,11 +345,11 @@ class Intensity:
 def _records(
     table: Any, folder: Path | None, progress: Progress | None
 ) -> tuple[list[Axis], dict[str, Table], dict[str, float], Table]:
-    """What a table `[records]` gives; all empty for None. folder: of the study file. Raises InputError.
+    """Read a table `[records]`. folder: of the study file. Raises InputError.
 
-    The axes `record`, and `scale` where scales are given; name -> `[motion]` table, without its key `kind`, with
-    absolute paths; name -> intensity measure at scale 1 [m/s^2], empty where none is asked for; and `[records]` with
-    the motions in it.
+    Returns four values, all empty for None: the axes `record` and, with scales, `scale`; name -> `[motion]` table of a
+    record, without the key `kind`, with absolute paths; name -> intensity measure at scale 1 [m/s^2], empty without
+    `intensity`; and the table `[records]` with motions in place of a suite file.
     """
     if table is None:
         return [], {}, {}, {}
@@ -381,18 +386,18 @@ def _suite(table: Mapping[str, Any], folder: Path | None, progress: Progress | N
 
 
 def example_text() -> str:
-    """A small study file, to start from: a few hundred runs."""
+    """The text of a small study file, to start from: a few hundred runs."""
     return (resources.files(__package__) / "example.toml").read_text(encoding="utf-8")
 
 
 def load_study(
     source: str | Path | Mapping[str, Any], progress: Progress | None = None, *, design: bool = False
 ) -> Study:
-    """The study in a TOML file, or of a table of the same keys. Paths in a file are relative to it.
+    """Read and check the study in a TOML file, or in a table of the same keys. Paths in a file are relative to it.
 
     progress: of the scaling of a suite of records. design: whether to try both ends of each random axis in place of
-    `[sampling]`, as the start of a search. Raises InputError of one line that names the file, the path of the
-    field, the value and the remedy.
+    `[sampling]`, at the start of a search. Raises InputError of one line that names the file, the path of the field,
+    the value and the remedy.
     """
     if isinstance(source, Mapping):
         return _study(source, None, progress, design)
@@ -404,7 +409,7 @@ def load_study(
 
 
 def _for_search(table: Mapping[str, Any]) -> Table:
-    """A study that tries its axes at both ends: what cannot be designed is found before the search."""
+    """The table of a study with random axes at both ends, so that designs without a scene fail before the search."""
     ends = {"method": "one-at-a-time", "quantiles": [1e-9, 1 - 1e-9]}
     random = any(isinstance(axis, Mapping) and "distribution" in axis for axis in _table(table, "axes").values())
     rest = {key: value for key, value in table.items() if key != "sampling"}
@@ -418,26 +423,26 @@ def _study(table: Mapping[str, Any], folder: Path | None, progress: Progress | N
     if "scene" not in table:
         raise InputError(f"scene is missing: give {KEYS['scene']}")
     with recording():  # a file that changes from here to the end of the check is an error
-        return _checked(table, folder, progress)
+        return _checked_study(table, folder, progress)
 
 
-def _checked(table: Mapping[str, Any], folder: Path | None, progress: Progress | None) -> Study:
+def _checked_study(table: Mapping[str, Any], folder: Path | None, progress: Progress | None) -> Study:
     scene = _scene(table["scene"], folder)
-    of_records, tables, intensities, record_table = _records(table.get("records"), folder, progress)
-    own = [axis_from(name, axis, folder) for name, axis in _table(table, "axes").items()]
-    axes = (*of_records, *own)
-    if of_records and (taken := [axis.name for axis in own if axis.name in OF_RECORDS]):
+    record_axes, tables, intensities, record_table = _records(table.get("records"), folder, progress)
+    named_axes = [axis_from(name, axis, folder) for name, axis in _table(table, "axes").items()]
+    axes = (*record_axes, *named_axes)
+    if record_axes and (taken := [axis.name for axis in named_axes if axis.name in OF_RECORDS]):
         raise InputError(f"axes.{taken[0]}: [records] makes the axes {' and '.join(OF_RECORDS)}; give another name")
     sampling = _sampling(table, axes)
     formulas = tuple(_table(table, "quantities").items())
     for name, text in formulas:
         if not isinstance(text, str):
             raise InputError(f"quantities.{name} = {text!r}: give a formula in quotes, such as 'peak_sliding_1 / 0.13'")
-    kept = table.get("keep", BUILDING_KEEP if "building" in scene else DEFAULT_KEEP)
-    if not isinstance(kept, list | tuple) or not all(isinstance(item, str) for item in kept):
-        raise InputError(f"keep = {kept!r}: give {KEYS['keep']} in quotes")
+    names = table.get("keep", BUILDING_KEEP if "building" in scene else DEFAULT_KEEP)
+    if not isinstance(names, list | tuple) or not all(isinstance(item, str) for item in names):
+        raise InputError(f"keep = {names!r}: give {KEYS['keep']} in quotes")
     keep = Keep(
-        tuple(kept),
+        tuple(names),
         formulas,
         (*(axis.name for axis in axes if axis.numeric), *([INTENSITY] if intensities else [])),
     )
@@ -450,7 +455,11 @@ def _checked(table: Mapping[str, Any], folder: Path | None, progress: Progress |
         **{key: value for key, value in table.items() if key != "about"},
         "scene": scene,
         **({"records": record_table} if tables else {}),
-        **({"axes": {axis.name: _complete(axis, table["axes"][axis.name]) for axis in own}} if own else {}),
+        **(
+            {"axes": {axis.name: _axis_table(axis, table["axes"][axis.name]) for axis in named_axes}}
+            if named_axes
+            else {}
+        ),
     }
     return check_study(
         Study(
@@ -465,14 +474,15 @@ def _checked(table: Mapping[str, Any], folder: Path | None, progress: Progress |
     )
 
 
-def _complete(axis: Axis, table: Table) -> Table:
-    """The table of an axis for the copy of the study: with the paths of its values and the labels that these had."""
+def _axis_table(axis: Axis, table: Table) -> Table:
+    """The table of an axis for the copy of the study: values with absolute paths, labels as the study file has them."""
     if axis.values is None or list(axis.values) == table.get("values"):
         return table
     return {**table, "values": list(axis.values), "labels": list(axis.labels)} if "values" in table else table
 
 
 def _table(table: Mapping[str, Any], key: str) -> Table:
+    """The table at a key of a study file; empty without the key. Raises InputError."""
     value = table.get(key, {})
     if not isinstance(value, Mapping):
         raise InputError(f"{key} = {value!r}: give {KEYS[key]}")
@@ -480,7 +490,7 @@ def _table(table: Mapping[str, Any], key: str) -> Table:
 
 
 def _scene(value: Any, folder: Path | None) -> Table:
-    """The table of the base scene, with absolute paths."""
+    """The table of the base scene, with absolute paths, from the value of the key `scene`."""
     if isinstance(value, str):
         table, path = scene_table(_beside(value, folder))
         folder = path.parent if path is not None else None
@@ -492,19 +502,19 @@ def _scene(value: Any, folder: Path | None) -> Table:
 
 
 def _beside(source: str, folder: Path | None) -> str:
-    """A path in a study file as seen from here; names of presets as they are."""
+    """A path in a study file, relative to the working directory; the name of a preset stays as it is."""
     path = (folder or Path()) / source
     return str(path) if is_input(path) else source
 
 
 def _sampling(table: Mapping[str, Any], axes: tuple[Axis, ...]) -> Sampling | None:
-    drawn = [axis.name for axis in axes if axis.random]
-    if not drawn and "cells" not in table.get("sampling", {}):
+    random_axes = [axis.name for axis in axes if axis.random]
+    if not random_axes and "cells" not in table.get("sampling", {}):
         if "sampling" in table:
             raise InputError("sampling: no axis has a distribution; leave it out")
         return None
     if "sampling" not in table:
         raise InputError(
-            f"sampling is missing: axes.{drawn[0]} has a distribution; give [sampling] with samples and seed"
+            f"sampling is missing: axes.{random_axes[0]} has a distribution; give [sampling] with samples and seed"
         )
     return Sampling(**fields_of(table, "sampling", Sampling))

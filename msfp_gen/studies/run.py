@@ -1,7 +1,8 @@
-"""`study`: runs what is missing of a study, on any engine: each chunk in a worker, whose rows are kept as it ends.
+"""`study`: runs the missing chunks of a study on a pool, and writes their rows into the folder of the study.
 
-A chunk is a file in the folder of the study, its part, named after a digest of everything that determines its rows. The
-files tell how far a study has come.
+Last step of a study: a worker runs a chunk, and the rows become one file, the part of the chunk. The name of the part
+contains a digest of everything that determines its rows. So the parts in the folder state how far a study has come
+(`study_status`).
 """
 
 from __future__ import annotations
@@ -47,16 +48,19 @@ if TYPE_CHECKING:
     from msfp_gen.buildings.file import AnyScene
 
 Progress = Callable[[int, int], None]
-FORMAT = 1  # of the rows of a part
+FORMAT = 1  # version of the format of a part
 STUDY_FILE = "study.toml"
 PARTS = "part-*.parquet"
 _NAME = re.compile(r"part-(\d{7})-[0-9a-f]{16}\.parquet")
-IDLE = 3  # times the longest interval between parts, after which a study counts as not running
-LEAST_IDLE = 10.0  # that time at least [s]
+IDLE = 3  # a study without a new part for this many times the longest interval between parts is not running
+LEAST_IDLE = 10.0  # shortest time without a new part after which a study is not running [s]
 
 
 class Outcome(NamedTuple):
-    """What a call of `study` did: runs (of the shard), done before, done now, and failed in all."""
+    """What a call of `study` did, as numbers of runs.
+
+    runs: of the shard. before: done by earlier calls. done: by this call. failed: of all runs that are done.
+    """
 
     runs: int
     before: int
@@ -76,25 +80,25 @@ def study(
     shard: tuple[int, int] = (1, 1),
     progress: Progress | None = None,
 ) -> Outcome:
-    """Run a study: what is missing in its folder is computed, and each chunk is one Parquet file there.
+    """Run the missing chunks of a study; each chunk becomes one Parquet file in the folder of the study.
 
-    The same call continues a study that was interrupted, at any time and by anything; a chunk per worker is lost at
-    most. A run that fails is a row with its status and message. With processes, a script must make this call under
+    The same call continues a study that was interrupted at any time; each worker loses one chunk at most. A run that
+    fails is a row with its status and message. With processes, a script must make this call under
     `if __name__ == "__main__":`.
 
     Args:
         source: a study file (docs/studies.md), a table of the same keys, or a `Study`.
-        output: the folder of the study: `part-*.parquet` and `study.toml`; it is made if it does not exist.
+        output: the folder of the study, for `part-*.parquet` and `study.toml`; made if it does not exist.
         workers: runs at the same time; None: one for each core.
         threads: threads instead of processes: they start at once, and suit few and long runs.
         executor: an executor (`concurrent.futures`) to run on, such as that of Parsl; it stays open.
         dask: address or scheduler file of a Dask cluster to run on.
         mpi: run on the other processes of `mpiexec ... -m mpi4py.futures`.
         shard: (i, n): only every n-th chunk, from the i-th; for job arrays that share `output`.
-        progress: called with the runs that are done, earlier ones included, and all (of the shard).
+        progress: called with the number of runs done, by earlier calls too, and the number of runs of the shard.
 
-    Raises InputError: invalid input, or a folder with another study; nothing was computed; RunError: workers died, or
-    more runs failed than `limits.failures` permits. What is done is kept.
+    Raises InputError before any run: invalid input, or a folder with another study; RunError: workers died, or more
+    runs failed than `limits.failures` permits. The parts that are written are kept.
     """
     _check_shard(shard)
     definition = source if isinstance(source, Study) else load_study(source)
@@ -105,7 +109,7 @@ def study(
 def run_on(
     pool: Pool, study: Study, folder: Path, shard: tuple[int, int] = (1, 1), progress: Progress | None = None
 ) -> Outcome:
-    """Compute what is missing of a study on a pool. Arguments and errors are those of `study`."""
+    """Run the missing chunks of a study on a pool. Arguments, result and errors: as of `study`."""
     make_folder(folder, "output")
     chunks = Chunks(study, folder)
     chunks.open()
@@ -120,7 +124,7 @@ def run_on(
             missing.append(task.number)
     _check_failures(study, failed, before, chunks.folder)
     if missing:
-        build_models([study.scene(1)])  # local workers find its model in the cache; other hosts build their own
+        build_models([study.scene(1)])  # workers on this host find the model in the cache; other hosts build their own
         chunks.started()
     if progress is not None:
         progress(before, total)
@@ -166,10 +170,10 @@ def _check_failures(study: Study, failed: int, done: int, folder: Path) -> None:
 
 
 class Order(NamedTuple):
-    """What workers need for any chunk of a study.
+    """All that a worker needs for any chunk of a study.
 
-    identity: of the whole study. digest: of what its parts have in common. files: path -> sha256 of those that its
-    scenes open. timed: whether parts state their seconds, for an estimate; otherwise equal rows have equal bytes.
+    identity, digest: as of `Chunks`. files: path -> sha256 of the files that the scenes open. timed: whether a part
+    states its core time, for an estimate; without it equal rows have equal bytes.
     """
 
     identity: str
@@ -181,13 +185,13 @@ class Order(NamedTuple):
     timed: bool = False
 
 
-_factories: dict[str, SceneFactory] = {}  # of the last study only
+_factories: dict[str, SceneFactory] = {}  # identity of a study -> its factory; of the last study only
 
 
 def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
-    """The part of a chunk as the bytes of a Parquet file, and how many of its runs failed.
+    """Run a chunk in a worker; returns its part as the bytes of a Parquet file, and the number of failed runs.
 
-    Raises ChangedFileError where a file is not as it was when the study was checked.
+    Raises ChangedFileError where a file has changed since the study was checked.
     """
     with expecting(order.files):
         factory = _factories.get(order.identity)
@@ -202,30 +206,31 @@ def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
             at = {axis.name: label for axis, label in zip(axes, labels, strict=True)}
             intensity = order.recipe.intensity(at)
             numbers = {**{axis.name: at[axis.name] for axis in axes if axis.numeric}, **intensity}
-            status, message, kept = _row(partial(factory.scene, values), order, numbers)
-            rows.append({"run": task.first + offset, **at, "status": status, "message": message, **intensity, **kept})
+            status, message, columns = _row(partial(factory.scene, values), order, numbers)
+            about = {"run": task.first + offset, **at, "status": status, "message": message}
+            rows.append({**about, **intensity, **columns})
     failed = sum(row["status"] not in ENDED for row in rows)
     seconds = time.thread_time() - begin
     return _part(order, rows, failed, {"seconds": f"{seconds:.4g}"} if order.timed else {}), failed
 
 
 def _row(make: Callable[[], AnyScene], order: Order, at: dict[str, float]) -> tuple[str, str, dict[str, Any]]:
-    """Status, message and quantities of one run."""
+    """Status, message and kept columns of one run. make: makes its scene. at: numbers of the axes, for formulas."""
     try:
         scene = make()
         check_method(scene)
         result = run_to_end(scene, seconds=order.run_seconds)
     except InputError as error:
         return BAD_INPUT, str(error), {}
-    except RunError as error:  # without rows, or with those that a slow computer reaches
+    except RunError as error:  # a run without rows, or out of time: its rows would depend on the computer
         remedy = "; see limits.run_seconds" if error.status == OUT_OF_TIME else ""
         return error.status, f"{error}{remedy}", {}
-    kept, problem = order.keep.values(result, at)
-    return result.status, result.message or problem, kept
+    columns, problem = order.keep.values(result, at)
+    return result.status, result.message or problem, columns
 
 
 def _part(order: Order, rows: list[dict[str, Any]], failed: int, more: dict[str, str]) -> bytes:
-    """The columns of every part: run, axes, status, message, intensity, quantities. more: metadata."""
+    """A part as bytes. Its columns: run, axes, status, message, intensity, kept quantities. more: metadata."""
     axes = [Column(axis.name, "", not axis.numeric) for axis in order.recipe.axes]
     intensity = [Column(INTENSITY, "m/s^2")] if order.recipe.intensities else []
     texts = [Column("status", "", text=True), Column("message", "", text=True)]
@@ -236,7 +241,10 @@ def _part(order: Order, rows: list[dict[str, Any]], failed: int, more: dict[str,
 
 
 class Chunks:
-    """The chunks of a study in a folder: of the size that they have there, unless the study file gives one."""
+    """The chunks of a study in a folder, with the size of the parts that are there, unless the study file gives one.
+
+    study: with that size. folder: of the study.
+    """
 
     def __init__(self, study: Study, folder: Path) -> None:
         size = _read(folder).get("about", {}).get("chunk")
@@ -246,21 +254,21 @@ class Chunks:
 
     def path(self, task: Task) -> Path:
         """The file of the part of a chunk."""
-        total = self._base.copy()
-        total.update(f"{task.first} {len(task)}".encode())
-        codes = iter(task.codes)
-        for digests in self._digests:
-            total.update(digests[next(codes)].tobytes() if digests is not None else b"")
-        total.update(np.ascontiguousarray(task.drawn, dtype="<f8").tobytes())
-        return self.folder / f"part-{task.number:07d}-{total.hexdigest()[:16]}.parquet"
+        digest = self._common.copy()
+        digest.update(f"{task.first} {len(task)}".encode())
+        for codes, digests in zip(task.codes, self._digests, strict=True):
+            digest.update(digests[codes].tobytes())
+        digest.update(np.ascontiguousarray(task.drawn, dtype="<f8").tobytes())
+        return self.folder / f"part-{task.number:07d}-{digest.hexdigest()[:16]}.parquet"
 
     @cached_property
     def digest(self) -> str:
         """Digest of everything that all rows have in common: scene, quantities, limits and equations."""
-        return str(self._base.hexdigest())
+        return str(self._common.hexdigest())
 
     @cached_property
-    def _base(self) -> Any:
+    def _common(self) -> Any:
+        """The running digest of everything that all rows have in common."""
         study = self.study
         common = {
             "format": FORMAT,
@@ -278,7 +286,7 @@ class Chunks:
 
     @cached_property
     def _digests(self) -> list[Any]:
-        """Of each grid axis the digests of its values and labels, as an array of 16 bytes each."""
+        """For each gridded axis the digests of its values and labels, array of 16 bytes, shape (values,)."""
         study, digests_of_axes = self.study, []
         for index, axis in enumerate(study.axes):
             if axis.values is None:
@@ -293,11 +301,11 @@ class Chunks:
 
     @cached_property
     def identity(self) -> str:
-        """Digest of everything that any row of the study depends on; that of what workers keep for it."""
+        """Digest of everything that any row of the study depends on."""
         return fingerprint((self.digest, [digests.tobytes() for digests in self._digests]))
 
     def open(self) -> None:
-        """Write `study.toml`; parts of a last, shorter chunk that the study has outgrown are removed.
+        """Write `study.toml`, and remove the part of a shorter last chunk that a study has outgrown.
 
         Raises InputError where the folder has parts of another study, or of another version.
         """
@@ -318,30 +326,31 @@ class Chunks:
             write_bytes(path, [text.encode()])
 
     def started(self) -> None:
-        """Note that runs start now: the time of `study.toml`, from which their rate is counted."""
+        """Set the time of `study.toml` to now, since the rate of runs is counted from it."""
         os.utime(self.folder / STUDY_FILE)
 
     def _check(self, present: dict[str, int]) -> None:
+        """Remove the part of an outgrown last chunk; raise InputError where any other part is not of this study."""
         chunks = self.study.chunks
-        other = [
+        foreign = [
             name
             for name, number in present.items()
             if number >= chunks or self.path(self.study.task(number)).name != name
         ]
         before = _read(self.folder).get("about", {})
         old_runs, old_chunk = int(before.get("runs", 0)), int(before.get("chunk", 1))
-        short = old_runs // old_chunk if old_runs % old_chunk else -1  # the last chunk, unless it was a whole one
-        for name in other:
-            if present[name] != short or old_runs >= self.study.runs:
+        shorter = old_runs // old_chunk if old_runs % old_chunk else -1  # number of a last chunk that was not full
+        for name in foreign:
+            if present[name] != shorter or old_runs >= self.study.runs:
                 raise InputError(
                     f"output = {str(self.folder)!r}: this folder has parts of another study "
                     f"({self._difference(before)}); give another folder"
                 )
-        for name in other:
+        for name in foreign:
             (self.folder / name).unlink()
 
     def _difference(self, before: dict[str, Any]) -> str:
-        """Where the study in the folder differs."""
+        """In what the study in the folder differs, for a message. before: table `about` of its `study.toml`."""
         if before.get("msfp_gen", __version__) != __version__:
             return f"computed by msfp-gen {before['msfp_gen']}"
         old = _read(self.folder)
@@ -357,13 +366,13 @@ class Chunks:
 
 
 def parts_in(folder: Path) -> dict[str, int]:
-    """Name -> number of the chunk, of every part in a folder."""
+    """Name of every part in a folder -> number of its chunk."""
     return {path.name: int(match[1]) for path in folder.glob(PARTS) if (match := _NAME.fullmatch(path.name))}
 
 
 @contextmanager
 def readable_parts(path: Path) -> Iterator[None]:
-    """Raise InputError that names a part, or the folder of all, where reading shows that it is damaged."""
+    """Raise InputError where reading a part fails. path: of the part, or of the folder, for the message."""
     from pyarrow import ArrowException
 
     try:
@@ -375,6 +384,7 @@ def readable_parts(path: Path) -> Iterator[None]:
 
 
 def _read(folder: Path) -> dict[str, Any]:
+    """The table of `study.toml` in a folder; empty where there is none."""
     path = folder / STUDY_FILE
     return toml_file(path) if path.is_file() else {}
 
@@ -401,11 +411,12 @@ class Status:
 
     Attributes:
         name: of the study.
-        runs, done, failed: numbers of runs: all, in parts, and of these not ended with `ok` or `stopped`.
-        parts, chunks: numbers of parts that are written, and of all.
-        rate: runs per second since the study was last started, on all its workers [1/s]; None before the first part.
+        runs, done, failed: number of all runs, of runs in parts, and of runs in parts that did not end with `ok` or
+            `stopped`.
+        parts, chunks: number of parts that are written, and of all chunks.
+        rate: runs per second on all workers since the study was last started [1/s]; None before the first part.
         running: whether parts still appear.
-        seconds_left: time left at that rate [s]; None where it is not known.
+        seconds_left: time left at `rate` [s]; None without a rate.
     """
 
     name: str
@@ -424,7 +435,7 @@ class Status:
 
 
 def study_status(folder: str | Path) -> Status:
-    """How far the study in a folder has come. Raises InputError where there is none."""
+    """How far the study in a folder has come. Raises InputError where the folder has no study."""
     folder = Path(folder)
     table = study_table(folder)
     runs, chunk = table["about"]["runs"], table["about"]["chunk"]
@@ -448,8 +459,8 @@ def study_status(folder: str | Path) -> Status:
 def _rate(folder: Path, written: dict[str, int]) -> tuple[float | None, bool]:
     """Runs per second since the study was last started, and whether parts still appear.
 
-    Workers end their chunks in bunches, so that the time between two parts says nothing: the rate counts from the
-    start, which is the time of `study.toml`.
+    Workers end their chunks in bunches, so that the time between two parts is no measure: the rate counts from the
+    start, which is the time of `study.toml`. written: name of a part -> number of its runs.
     """
     begin = (folder / STUDY_FILE).stat().st_mtime
     stamps = ((folder / name).stat().st_mtime for name in written)
@@ -463,7 +474,7 @@ def _rate(folder: Path, written: dict[str, int]) -> tuple[float | None, bool]:
 
 
 def failures(part: Path) -> int:
-    """The number of failed runs of a part. Raises InputError where it is damaged."""
+    """The number of failed runs of a part. Raises InputError where the part is damaged."""
     import pyarrow.parquet as pq
 
     with readable_parts(part):
@@ -471,7 +482,7 @@ def failures(part: Path) -> int:
 
 
 def status_table(status: Status) -> Table:
-    """The status for a terminal."""
+    """The status of a study as a table for a terminal."""
     rows = [
         ("runs", f"{status.done} of {status.runs} done ({100 * status.done / status.runs:.1f} %)"),
         ("failed", f"{status.failed}; see the columns status and message" if status.failed else "0"),

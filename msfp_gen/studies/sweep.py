@@ -1,4 +1,7 @@
-"""Parameter sweeps: a scene in every combination of the values of some fields, and the table of the runs."""
+"""Parameter sweeps (`--vary`): a scene with every combination of the values of some fields, and the table of the runs.
+
+Scenes come from the axes of a study (`axes`), rows from the quantities of their results (`columns`); a batch runs them.
+"""
 
 from __future__ import annotations
 
@@ -24,13 +27,13 @@ if TYPE_CHECKING:
     from msfp_gen.results.result import Result
     from msfp_gen.scene.file.loader import SuiteRecord
 
-MAX_SCENES = 100_000  # of one sweep; more are taken to be a typing error
-WIDTH = 80  # columns of a terminal
+MAX_SCENES = 100_000  # of one sweep; more scenes are taken to be a typing error
+WIDTH = 80  # characters of a line of a terminal
 LONGEST = 16  # characters of a varied value, or of the name of a scene, in a terminal
 
 
 class Variation(NamedTuple):
-    """A scene of a sweep: the file or preset that it comes from, and the varied fields by their paths."""
+    """A scene of a sweep. source: its file or preset. varied: path of each varied field -> value."""
 
     source: str
     varied: Mapping[str, Any]
@@ -61,11 +64,11 @@ def varied_field(text: str) -> tuple[str, list[Any]]:
 def variations(
     source: str | Path, fields: Sequence[tuple[str, list[Any]]], records: Sequence[SuiteRecord] = ()
 ) -> list[Variation]:
-    """The scenes of all combinations of values, the last field varying fastest; their names state the values.
+    """The scenes of all combinations of values, the last field fastest; the name of a scene states its values.
 
-    source: scene file or preset. fields: path and values of each. records: of a suite, in place of the motion of the
-    scene; they vary slowest, as the field "record". Raises InputError: a field is given twice, does not exist, or does
-    not accept a value.
+    source: scene file or preset. fields: (path, values) of each field. records: of a suite, in place of the motion of
+    the scene; slowest, as the field "record". Raises InputError: a field is given twice, does not exist, or does not
+    accept a value.
     """
     paths = [path for path, _ in fields]
     if records and (motion := [path for path in paths if path.partition(".")[0] == "motion"]):
@@ -94,7 +97,7 @@ def variations(
 
 
 class Row(NamedTuple):
-    """A run of a sweep: its number from 1, its scene and varied fields, its summary, and the file with its rows."""
+    """A run of a sweep. number: from 1. variation: its scene. file: name of the file with its rows, or ""."""
 
     number: int
     variation: Variation
@@ -109,7 +112,7 @@ class Row(NamedTuple):
 
 
 def row_of(number: int, variation: Variation, result: Result | BuildingResult | RunError, file: Path | None) -> Row:
-    """The row of a run, or of one that failed before its first row; the result itself is not kept."""
+    """The row of a run, without its result. result: of the run, or its RunError where it failed before a first row."""
     if not isinstance(result, RunError):
         return Row(number, variation, result.summary, "" if file is None else file.name)
     summary = {"status": result.status, "message": str(result), "name": variation.scene.name}
@@ -118,7 +121,7 @@ def row_of(number: int, variation: Variation, result: Result | BuildingResult | 
 
 
 def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> Path:
-    """Write the rows, sorted by their number, as CSV or Parquet; arguments and errors are those of `write_columns`.
+    """Write the rows, sorted by number, as CSV or Parquet; path, name and errors as of `write_columns`.
 
     The columns are the varied fields and the quantities of the summaries of bearings and of buildings.
     """
@@ -131,8 +134,9 @@ def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> 
     }
     counts: dict[bool, Counts] = {}
     for row in rows:
-        own = Counts.of(row.variation.scene)
-        counts[own.bearings > 0] = counts.get(own.bearings > 0, Counts()).or_more(own)
+        of_scene = Counts.of(row.variation.scene)
+        is_building = of_scene.bearings > 0
+        counts[is_building] = counts.get(is_building, Counts()).or_more(of_scene)
     sources = {name: source for _, count in sorted(counts.items()) for name, source in catalogue(count).items()}
     for column, source in sources.items():
         if source.quantity.characterised:
@@ -144,7 +148,7 @@ def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> 
 
 
 def sweep_table(rows: Sequence[Row]) -> Table:
-    """The rows for a terminal, 80 columns wide at most: what does not fit is only in the table that is written."""
+    """The rows for a terminal, at most 80 characters wide; fields that do not fit are named in the title."""
     rows = sorted(rows)
     every = dict.fromkeys(path for row in rows for path in row.variation.varied)
     paths = [path for path in every if len(rows) == 1 or len({str(row.variation.varied.get(path)) for row in rows}) > 1]
@@ -162,10 +166,12 @@ def sweep_table(rows: Sequence[Row]) -> Table:
         "[ms]": [_number(row, "wall_time", 1e3, 0) for row in rows],
     }
     for count in range(len(paths), -1, -1):
-        last = [path.rpartition(".")[2] for path in paths[:count]]  # enough of a path where no other ends so
-        names = [end if last.count(end) == 1 else path for path, end in zip(paths, last, strict=False)]
+        ends = [
+            path.rpartition(".")[2] for path in paths[:count]
+        ]  # the last key names a field unless two paths share it
+        names = [end if ends.count(end) == 1 else path for path, end in zip(paths, ends, strict=False)]
         table = {**leading, **dict(zip(names, varied.values(), strict=False)), **peaks}
-        # as `rich` draws it: three characters of space for each column, and one more
+        # `rich` adds three characters for each column, and one for the table
         if sum(max(map(len, (name, *cells))) + 3 for name, cells in table.items()) + 1 <= WIDTH:
             break
     title = f"{len(rows)} runs: peak displacement u, peak force F, rims met, run time"
@@ -175,12 +181,12 @@ def sweep_table(rows: Sequence[Row]) -> Table:
 
 
 def _number(row: Row, path: str, scale: float, digits: int) -> str:
-    """A value of a summary for the terminal; a run that failed before its first row has none."""
+    """A value of a summary as text; "-" for a run that failed before its first row."""
     value = value_at(row.summary, path)
     return "-" if value is None else f"{value * scale:.{digits}f}"
 
 
 def _short(text: str) -> str:
-    """`text`, shortened in its middle: names of records and lists differ at their ends."""
+    """`text`, shortened in its middle, since names of records and lists differ at their ends."""
     half = (LONGEST - 2) // 2
     return text if len(text) <= LONGEST else f"{text[:half]}..{text[-half:]}"

@@ -21,7 +21,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.specification import formula
-from msfp_gen.studies.assessment.rows import numbers, read_study
+from msfp_gen.studies.assessment.rows import COMPLETE, numbers, read_study
 from msfp_gen.studies.axes import Sampling, SceneFactory, values_at
 from msfp_gen.studies.batch import Pool
 from msfp_gen.studies.columns import Keep
@@ -34,7 +34,6 @@ BLOCK = 1024  # draws that are made together
 CHUNKS = {EXACT: 4, "backbone": 64}  # model -> runs of a part
 CHUNK = 8  # runs of a part of any other model
 MEASURED = 4  # parts from which the cost of a run is computed
-ENDED = "ok"  # status of a run that reached its end
 
 
 class Source(Protocol):
@@ -171,13 +170,13 @@ class _Model:
         run_on(self.pool, self._listed_study(), self.folder)
         rows = read_study(self.folder, [self.quantity])
         values = numbers(rows, self.quantity)
-        ended = np.asarray(rows["status"] == ENDED)
+        complete = np.asarray(rows["status"] == COMPLETE)
         if len(values) < len(self.listed):
             raise RunError(
                 f"{self.folder}: {len(self.listed) - len(values)} runs are missing; run the same command again"
             )
         self._values = np.where(np.isnan(values), np.inf, values)
-        self._early = ~ended | np.isnan(values)
+        self._early = ~complete | np.isnan(values)
 
     def _listed_study(self) -> Study:
         """The study whose rows are the listed runs."""
