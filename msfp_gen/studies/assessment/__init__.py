@@ -1,1 +1,1 @@
-"""Evaluation of studies: IDA curves, fragility, sensitivity, Pareto fronts, with figures (docs/studies.md)."""
+"""Evaluation of the rows of a study: IDA curves, fragility, sensitivity, Pareto fronts, figures (docs/studies.md)."""

@@ -1,8 +1,8 @@
-"""Fragility: the probability that a demand exceeds a threshold, by intensity, as a lognormal distribution.
+"""Fragility from the rows of a study: probability that a demand exceeds a threshold, a lognormal law of the intensity.
 
 The maximum likelihood estimate of J. W. Baker, "Efficient analytical fragility function fitting using dynamic
-structural analysis", Earthquake Spectra 31 (2015), 579-599: stripes, IDA runs and single runs alike. The likelihood of
-P = Phi(a + b ln x) is concave, so that its maximum is the only one.
+structural analysis", Earthquake Spectra 31 (2015), 579-599, for stripes, IDA runs and single runs. The log-likelihood
+of P = Phi(a + b ln x) is concave, so that it has one maximum.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ITERATIONS = 100
-CONVERGED = 1e-10  # of the Newton decrement
+CONVERGED = 1e-10  # Newton decrement at which the fit ends
 EARLY = {
     "leave-out": "left out, and counted",
     "exceed": "count as runs above the threshold",
     "refuse": "an error",
 }
 LEAST_BOOTSTRAPS = 100
-POINTS = 200  # of a curve that is written
+POINTS = 200  # of a curve in a file
 DRAWN = 300  # points of a curve in a figure
 SHADE = 0.16  # opacity of a confidence band
 Interval = tuple[float, float]
@@ -51,9 +51,10 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted curve.
+    """A fitted curve P = Phi(a + b ln x).
 
-    coefficients: a and b, ndarray, shape (2,), [-]. covariance: the inverse of their Fisher information, (2, 2) [-].
+    coefficients: a and b, ndarray, shape (2,), [-]. covariance: inverse of the Fisher information of a and b, (2, 2)
+    [-].
     """
 
     coefficients: Array
@@ -61,17 +62,17 @@ class Fit:
 
     @property
     def median(self) -> float:
-        """exp(-a/b): where the probability is one half."""
+        """The intensity at which the probability is one half, exp(-a/b) [unit of the intensity]."""
         return float(np.exp(-self.coefficients[0] / self.coefficients[1]))
 
     @property
     def dispersion(self) -> float:
-        """1/b."""
+        """Standard deviation of the logarithm of the intensity, 1/b [-]."""
         return float(1 / self.coefficients[1])
 
     @property
     def errors(self) -> Array:
-        """Standard errors of the logarithms of median and dispersion, to first order, shape (2,) [-]."""
+        """Standard errors of ln median and ln dispersion, to first order, shape (2,) [-]."""
         a, b = self.coefficients
         slopes = np.array([[-1 / b, a / b**2], [0.0, -1 / b]])
         return np.sqrt(np.diag(slopes @ self.covariance @ slopes.T))
@@ -83,7 +84,7 @@ class Fit:
         return np.asarray(ndtr(self.coefficients[0] + self.coefficients[1] * log_x))
 
     def band(self, log_x: Array, level: float) -> tuple[Array, Array]:
-        """Pointwise confidence bounds of the probability [-], of the shape of `log_x`, from those of a + b ln x."""
+        """Pointwise confidence bounds of the probability [-], of the shape of `log_x`, from bounds of a + b ln x."""
         from scipy.special import ndtr, ndtri
 
         rows = np.stack([np.ones_like(log_x), log_x], axis=-1)
@@ -94,26 +95,28 @@ class Fit:
 
 
 def fitted(log_x: Array, runs: Array, over: Array, where: str, start: Fit | None = None) -> Fit:
-    """The fit to `over` exceedances of `runs` at each ln x, all ndarrays, shape (levels,).
+    """The fit to `over` exceedances among `runs` runs at each ln x, all ndarrays, shape (levels,).
 
-    Raises InputError that begins with `where`: runs that determine no curve with a positive slope.
+    start: a fit to begin with. Raises InputError that begins with `where`: the runs determine no curve with a positive
+    slope.
     """
     used = runs > 0
     log_x, runs, over = log_x[used], np.asarray(runs[used], dtype=float), np.asarray(over[used], dtype=float)
     _check(log_x, runs, over, where)
     middle, width = float(np.average(log_x, weights=runs)), float(np.ptp(log_x))
     scaled = (log_x - middle) / width  # between -1 and 1, for the conditioning of the normal equations
-    back = np.array([[1.0, -middle / width], [0.0, 1 / width]])
-    guess = np.array([0.0, 1.0]) if start is None else np.linalg.solve(back, start.coefficients)
+    unscale = np.array([[1.0, -middle / width], [0.0, 1 / width]])
+    guess = np.array([0.0, 1.0]) if start is None else np.linalg.solve(unscale, start.coefficients)
     rows = np.stack([np.ones_like(scaled), scaled], axis=-1)
     solution, information = _newton(rows, runs, over, guess, where)
-    coefficients = back @ solution
+    coefficients = unscale @ solution
     if not coefficients[1] > 0:
         raise InputError(f"{where}: exceedances do not grow with the intensity; there is no fragility curve")
-    return Fit(coefficients, back @ np.linalg.inv(information) @ back.T)
+    return Fit(coefficients, unscale @ np.linalg.inv(information) @ unscale.T)
 
 
 def _check(log_x: Array, runs: Array, over: Array, where: str) -> None:
+    """Raise InputError where the runs determine no curve: none or all exceed, or the intensities do not overlap."""
     total, exceeded = int(runs.sum()), int(over.sum())
     if exceeded in (0, total):
         word = "none" if exceeded == 0 else "all"
@@ -129,7 +132,10 @@ def _check(log_x: Array, runs: Array, over: Array, where: str) -> None:
 
 
 def _newton(rows: Array, runs: Array, over: Array, start: Array, where: str) -> tuple[Array, Array]:
-    """Fisher scoring with steps that are halved until the likelihood grows; returns solution and information."""
+    """Maximise the likelihood by Fisher scoring, with steps halved until it grows; returns solution and information.
+
+    rows: of the design matrix, shape (levels, 2). where: of the fit, for a message.
+    """
     from scipy.special import log_ndtr
 
     def likelihood(x: Array) -> float:
@@ -146,12 +152,12 @@ def _newton(rows: Array, runs: Array, over: Array, start: Array, where: str) -> 
         step = np.linalg.solve(information, gradient)
         if gradient @ step < CONVERGED:
             return x, information
-        size = 1.0
-        while not likelihood(x + size * step) > value and size > 1e-12:
-            size /= 2
-        if size <= 1e-12:  # no growth that roundoff can show
+        factor = 1.0
+        while not likelihood(x + factor * step) > value and factor > 1e-12:
+            factor /= 2
+        if factor <= 1e-12:  # any growth is below roundoff
             return x, information
-        x = x + size * step
+        x = x + factor * step
         value = likelihood(x)
     raise InputError(f"{where}: the likelihood has no maximum that could be found; give more runs near the threshold")
 
@@ -162,16 +168,16 @@ class DamageState:
 
     Attributes:
         threshold: of the demand [its unit].
-        median: intensity at which the probability is one half.
-        dispersion: standard deviation of the logarithm of the intensity.
-        median_interval, dispersion_interval: their confidence intervals.
-        runs, exceeded: numbers of runs that were used, and of those above the threshold.
-        left_out: runs that ended early below the threshold.
-        intensity, runs_at, exceeded_at: by intensity, shape (k,): its value [its unit] and the numbers of runs.
-        fit: the underlying fit, for curves and bands.
-        samples: pairs (intercept, slope) of the bootstrap, ndarray, shape (bootstraps, 2), [-]; None without it.
-        level: of confidence.
-        case: value of the column `by`; "" without it.
+        median: intensity at which the probability is one half [unit of the intensity].
+        dispersion: standard deviation of the logarithm of the intensity [-].
+        median_interval, dispersion_interval: confidence intervals of median and dispersion.
+        runs, exceeded: number of runs used in the fit, and number of runs at or above the threshold.
+        left_out: number of runs that ended early below the threshold and are not in the fit.
+        intensity, runs_at, exceeded_at: intensities, shape (k,) [its unit], and at each the numbers of runs as above.
+        fit: the fit, for curves and bands.
+        samples: pairs (a, b) of the bootstrap, ndarray, shape (bootstraps, 2), [-]; None without bootstrap.
+        level: of confidence [-].
+        case: value of the column `by`; "" without `by`.
     """
 
     threshold: float
@@ -195,7 +201,7 @@ class DamageState:
         return self.fit.probability(np.log(intensity))
 
     def band(self, intensity: Array) -> tuple[Array, Array]:
-        """Lower and upper bound of the probability [-], of the shape of `intensity`, each at `level` of confidence."""
+        """Pointwise lower and upper confidence bound of the probability [-], of the shape of `intensity`."""
         if self.samples is None:
             return self.fit.band(np.log(intensity), self.level)
         from scipy.special import ndtr
@@ -207,7 +213,11 @@ class DamageState:
 
 @dataclass(frozen=True)
 class Fragility:
-    """Result of `fragility`: names and units of the columns, and the damage states by rising threshold."""
+    """Result of `fragility`.
+
+    measure, demand, measure_unit, unit: names and units of the columns of intensity and demand. states: by case, then
+    by rising threshold.
+    """
 
     measure: str
     demand: str
@@ -240,38 +250,37 @@ def fragility(
 ) -> Fragility:
     """Fragility curves by maximum likelihood, one for each threshold of the demand.
 
-    A run exceeds a threshold where its demand is not below it. A run that ended early has a demand of at least what it
-    reached: it exceeds the thresholds that it reached, and `early` says what it is for the others.
+    A run exceeds a threshold if its demand is at least the threshold. The demand of a run that ended early is a lower
+    bound: the run exceeds every threshold up to it, and `early` states how it counts for higher thresholds.
 
     rows: DataFrame of `read_study`, or a part of it. measure, demand: columns of the intensity measure, such as
     `scale`, and of the demand. thresholds: damage states. early: a key of EARLY. level: of confidence of intervals and
-    bands. bootstrap: number of samples; 0: intervals from the Fisher information, which takes all runs for
-    independent. cluster: column whose values are drawn as a whole by the bootstrap: the runs of one record depend on
-    each other. seed: of the bootstrap. by: column for each of whose values the curves are fitted apart, such as
-    `bounds`.
+    bands. bootstrap: number of samples; 0: intervals from the Fisher information, which takes all runs as independent.
+    cluster: column whose values the bootstrap draws, each with all its runs, since the runs of one record depend on
+    each other. seed: of the bootstrap. by: column, such as `bounds`; the curves are fitted for each of its values.
 
-    Raises InputError: unknown columns, or runs that determine no curve: none or all exceed, or the two kinds do not
-    overlap.
+    Raises InputError: unknown columns, or runs that determine no curve: none or all exceed, or the intensities of runs
+    that exceed and of runs that do not exceed do not overlap.
     """
     if not thresholds or len(set(thresholds)) < len(thresholds):
         raise InputError(f"thresholds = {list(thresholds)}: give one or more different values of {demand}")
     check_share("level", level)
     parsed(Choice(EARLY), early, "early")
     states: list[DamageState] = []
-    for case, chosen in _cases(rows, by):
-        x, y, ended = intensities(chosen, measure), demands(chosen, demand), complete(chosen)
-        groups = _groups(chosen, cluster, bootstrap)
+    for case, case_rows in _cases(rows, by):
+        x, y, ended = intensities(case_rows, measure), demands(case_rows, demand), complete(case_rows)
+        groups = _groups(case_rows, cluster, bootstrap)
         for threshold in sorted(thresholds):
             exceeded, known = _exceedance(y, ended, threshold, early, demand)
-            drawn = None if groups is None else (groups[known], bootstrap, seed)
+            resampling = None if groups is None else (groups[known], bootstrap, seed)
             where = f"threshold {threshold:g} of {demand}" + (f", {by} = {case}" if by else "")
-            state = _state(x[known], exceeded[known], threshold, int((~known).sum()), level, drawn, where)
+            state = _state(x[known], exceeded[known], threshold, int((~known).sum()), level, resampling, where)
             states.append(replace(state, case=case))
     return Fragility(measure, demand, unit_of(rows, measure), unit_of(rows, demand), tuple(states))
 
 
 def _cases(rows: Any, by: str | None) -> list[tuple[str, Any]]:
-    """Each value of a column, in the order in which they occur, and its rows; all rows without a column."""
+    """(value, rows with this value) for each value of a column, in order of occurrence; all rows without a column."""
     if by is None:
         return [("", rows)]
     check_columns([by], rows.columns)
@@ -279,7 +288,7 @@ def _cases(rows: Any, by: str | None) -> list[tuple[str, Any]]:
 
 
 def _groups(rows: Any, cluster: str, bootstrap: int) -> Any:
-    """The number of the cluster of each run; None without a bootstrap."""
+    """The number of the cluster of each run, shape (runs,); None without a bootstrap. Raises InputError."""
     import pandas as pd
 
     if not bootstrap:
@@ -294,7 +303,7 @@ def _groups(rows: Any, cluster: str, bootstrap: int) -> Any:
 
 
 def _exceedance(y: Array, ended: Any, threshold: float, early: str, demand: str) -> tuple[Any, Any]:
-    """Whether each run exceeds, and whether that is known."""
+    """Whether each run exceeds the threshold, and whether this is known, both shape (runs,). Raises InputError."""
     exceeded = y >= threshold
     unknown = ~ended & ~exceeded
     if early == "refuse" and unknown.any():
@@ -308,21 +317,22 @@ def _exceedance(y: Array, ended: Any, threshold: float, early: str, demand: str)
 
 
 def _state(
-    x: Array, exceeded: Any, threshold: float, left_out: int, level: float, drawn: Any, where: str
+    x: Array, exceeded: Any, threshold: float, left_out: int, level: float, resampling: Any, where: str
 ) -> DamageState:
+    """The damage state of runs at intensities x. resampling: last arguments of `_bootstrap`, None without bootstrap."""
     from scipy.special import ndtri
 
-    log_levels, place = np.unique(np.log(x), return_inverse=True)
-    runs = np.asarray(np.bincount(place), dtype=float)
-    over = np.asarray(np.bincount(place, weights=exceeded), dtype=float)
+    log_levels, level_of_run = np.unique(np.log(x), return_inverse=True)
+    runs = np.asarray(np.bincount(level_of_run), dtype=float)
+    over = np.asarray(np.bincount(level_of_run, weights=exceeded), dtype=float)
     fit = fitted(log_levels, runs, over, where)
-    ends = np.array([(1 - level) / 2, (1 + level) / 2])
-    samples = None if drawn is None else _bootstrap(log_levels, place, exceeded, fit, *drawn)
+    tails = np.array([(1 - level) / 2, (1 + level) / 2])
+    samples = None if resampling is None else _bootstrap(log_levels, level_of_run, exceeded, fit, *resampling)
     if samples is None:
-        spread = [np.exp(ndtri(ends) * error) for error in fit.errors]
-        intervals = [fit.median * spread[0], fit.dispersion * spread[1]]
+        ratios = [np.exp(ndtri(tails) * error) for error in fit.errors]
+        intervals = [fit.median * ratios[0], fit.dispersion * ratios[1]]
     else:
-        intervals = [np.quantile(np.exp(-samples[:, 0] / samples[:, 1]), ends), np.quantile(1 / samples[:, 1], ends)]
+        intervals = [np.quantile(np.exp(-samples[:, 0] / samples[:, 1]), tails), np.quantile(1 / samples[:, 1], tails)]
     of_median, of_dispersion = (tuple(interval.tolist()) for interval in intervals)
     return DamageState(
         threshold, fit.median, fit.dispersion, of_median, of_dispersion, len(x), int(over.sum()), left_out,
@@ -330,13 +340,17 @@ def _state(
     )  # fmt: skip
 
 
-def _bootstrap(levels: Array, place: Any, exceeded: Any, fit: Fit, groups: Any, count: int, seed: int) -> Array:
-    """Fits to clusters drawn with replacement; draws that determine no curve are drawn again."""
-    clusters, group = np.unique(groups, return_inverse=True)
+def _bootstrap(levels: Array, level_of_run: Any, exceeded: Any, fit: Fit, groups: Any, count: int, seed: int) -> Array:
+    """Coefficients of `count` fits to clusters drawn with replacement, shape (count, 2) [-].
+
+    levels: ln x. level_of_run, exceeded, groups: of every run, its index in `levels`, whether it exceeds, and its
+    cluster. Clusters that determine no curve are drawn again. Raises InputError.
+    """
+    clusters, cluster_of_run = np.unique(groups, return_inverse=True)
     shape = (len(clusters), len(levels))
     runs, over = np.zeros(shape), np.zeros(shape)
-    np.add.at(runs, (group, place), 1)
-    np.add.at(over, (group, place), exceeded)
+    np.add.at(runs, (cluster_of_run, level_of_run), 1)
+    np.add.at(over, (cluster_of_run, level_of_run), exceeded)
     rng, failed = np.random.default_rng(seed), 0
     fits: list[Array] = []
     while len(fits) < count:
@@ -351,7 +365,7 @@ def _bootstrap(levels: Array, place: Any, exceeded: Any, fit: Fit, groups: Any, 
 
 
 def fragility_frame(result: Fragility) -> Any:
-    """Points of the curves with their bands, as a DataFrame: case, threshold, intensity, probability, low, high."""
+    """Points of curves and bands as a DataFrame: case, threshold, intensity, probability, low, high."""
     import pandas as pd
 
     frames = []
@@ -364,7 +378,7 @@ def fragility_frame(result: Fragility) -> Any:
 
 
 def fragility_table(result: Fragility) -> Table:
-    """The damage states for a terminal."""
+    """The damage states as a table for a terminal."""
     unit = f" [{result.unit}]" if result.unit else ""
     columns = (f"{result.demand}{unit}", "median", "interval", "dispersion", "interval", "runs", "exceeded", "left out")
     rows = [
@@ -387,8 +401,8 @@ def fragility_table(result: Fragility) -> Table:
 
 def plot_fragility(result: Fragility, path: str | Path | None = None, title: str = "") -> Figure:
     """Probability of exceedance over intensity: curve, band and shares of every damage state. path: as of `page`."""
-    every = np.concatenate([state.intensity for state in result.states])
-    x = np.geomspace(every.min(), every.max(), DRAWN)
+    intensity = np.concatenate([state.intensity for state in result.states])
+    x = np.geomspace(intensity.min(), intensity.max(), DRAWN)
     scale = scale_of([state.threshold for state in result.states], result.unit)
     with page(*SIZE, path) as figure:
         headline(figure, title or "fragility")
@@ -398,7 +412,7 @@ def plot_fragility(result: Fragility, path: str | Path | None = None, title: str
             text = f"{plain(name)}: θ = {state.median:.3g}, β = {state.dispersion:.2g}"
             axes.plot(x, state.probability(x), color=colour, label=text)
             axes.fill_between(x, *state.band(x), color=colour, alpha=SHADE, linewidth=0)
-            if state.runs_at.max() > 1:  # levels with several runs have a share
+            if state.runs_at.max() > 1:  # intensities with several runs have an observed share
                 axes.plot(state.intensity, state.exceeded_at / state.runs_at, "o", color=colour, markersize=3.5)
         axes.set(
             xlabel=labelled(result.measure, result.measure_unit),

@@ -1,4 +1,7 @@
-"""Incremental dynamic analysis: curves of demand over intensity, and their fractiles (Vamvatsikos and Cornell 2002)."""
+"""Incremental dynamic analysis of the rows of a study: curves of demand over intensity, and fractiles of these curves.
+
+After Vamvatsikos and Cornell (2002).
+"""
 
 from __future__ import annotations
 
@@ -30,10 +33,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FRACTILES = (0.16, 0.5, 0.84)
-POINTS = 50  # of the fractiles of curves with different intensities
-MOST_CURVES = 400  # that are drawn one by one
-SCALE = "scale"  # the axis by which [records] scales them
-Curve = tuple[Array, Array, Any]  # intensities, demands, and which runs reached their end
+POINTS = 50  # intensities of the fractiles, where the curves have different intensities
+MOST_CURVES = 400  # in a figure
+SCALE = "scale"  # axis of a study that scales the records
+Curve = tuple[Array, Array, Any]  # intensities, demands, and whether each run reached its end
 
 
 @dataclass(frozen=True)
@@ -43,10 +46,10 @@ class Ida:
     Attributes:
         measure, demand: names of the columns.
         measure_unit, unit: of intensity and demand.
-        curves: DataFrame with one row for each run, sorted: the column `curve`, the measure, the demand, and `ended`,
-            false where the run ended early, so that its demand is a lower bound.
-        fractiles: DataFrame with a row for each intensity: the measure, `curves`, `ended_early`, and a column for each
-            fractile, such as `p50`; infinite where so many runs ended early that the fractile lies among them.
+        curves: DataFrame, one row for each run, sorted by curve and intensity: `curve`, the measure, the demand, and
+            `ended`, false for a run that ended early, whose demand is a lower bound.
+        fractiles: DataFrame, one row for each intensity: the measure, `curves`, `ended_early`, and one column for each
+            fractile, such as `p50`; infinite where the fractile lies among runs that ended early.
     """
 
     measure: str
@@ -58,18 +61,19 @@ class Ida:
 
     @property
     def shares(self) -> list[str]:
-        """The columns of the fractiles, such as `p50`."""
+        """Names of the columns of the fractiles, such as `p50`."""
         return [name for name in self.fractiles.columns if name.startswith("p")]
 
 
 def ida(rows: Any, measure: str, demand: str, fractiles: Sequence[float] = FRACTILES) -> Ida:
     """IDA curves, and the fractiles of the demand at each intensity.
 
-    A curve is made of the runs that differ in their intensity only: one for each record, sample and bound. A run that
-    ended early counts as a demand above all others, and so does a larger intensity of its curve. The fractile of share
-    p of n curves is the smallest demand that at least p n of them do not exceed; where p n is a whole number, the mean
-    of it and the next, so that the median of an even number is the mean of the middle two. Where the curves have
-    different intensities, such as spectral accelerations, their demands are interpolated, from zero at zero.
+    The runs of a curve differ in their intensity only; there is one curve for each record, sample and bound. A run that
+    ended early counts as a demand above all others, and so does every larger intensity of its curve. The fractile p of
+    n curves is the smallest demand that at least p n curves do not exceed; where p n is a whole number, it is the mean
+    of this demand and the next larger demand, so that the median of an even number of curves is the mean of the middle
+    two. Where the curves have different intensities, such as spectral accelerations, demands are interpolated, from
+    zero at zero.
 
     rows: DataFrame of `read_study`, or a part of it. measure: column of the intensity measure, such as `scale` or
     `intensity`. demand: column of the demand, such as `peak_displacement`. fractiles: shares between 0 and 1. Raises
@@ -80,31 +84,34 @@ def ida(rows: Any, measure: str, demand: str, fractiles: Sequence[float] = FRACT
     if not fractiles or not all(0 < share < 1 for share in fractiles):
         raise InputError(f"fractiles = {list(fractiles)}: give shares between 0 and 1, such as 0.16")
     columns = {measure: intensities(rows, measure), demand: demands(rows, demand), "ended": complete(rows)}
-    curves = pd.DataFrame({"curve": _curve_numbers(rows, measure), **columns})
-    curves = curves.sort_values(["curve", measure], ignore_index=True)
-    sizes = curves.groupby("curve")[measure].nunique()
+    frame = pd.DataFrame({"curve": _curve_numbers(rows, measure), **columns})
+    frame = frame.sort_values(["curve", measure], ignore_index=True)
+    sizes = frame.groupby("curve")[measure].nunique()
     if sizes.min() < 2:
         raise InputError(f"{measure}: an IDA needs several intensities of each record; curve {sizes.idxmin()} has one")
-    points = [(c[measure].to_numpy(), c[demand].to_numpy(), c["ended"].to_numpy()) for _, c in curves.groupby("curve")]
-    levels = _levels(points)
-    values = np.sort([_interpolated(levels, *curve) for curve in points], axis=0)
-    table = {measure: levels, "curves": len(points), "ended_early": np.isinf(values).sum(axis=0)}
+    curves = [(c[measure].to_numpy(), c[demand].to_numpy(), c["ended"].to_numpy()) for _, c in frame.groupby("curve")]
+    levels = _common_intensities(curves)
+    values = np.sort([_interpolated(levels, *curve) for curve in curves], axis=0)
+    table = {measure: levels, "curves": len(curves), "ended_early": np.isinf(values).sum(axis=0)}
     for share in fractiles:
         table[f"p{100 * share:g}"] = _fractile(values, share)
-    return Ida(measure, demand, unit_of(rows, measure), unit_of(rows, demand), curves, pd.DataFrame(table))
+    return Ida(measure, demand, unit_of(rows, measure), unit_of(rows, demand), frame, pd.DataFrame(table))
 
 
 def _fractile(values: Array, share: float) -> Array:
-    """The fractile of each column of sorted rows (the second definition of Hyndman and Fan, 1996)."""
+    """The fractile of every column of sorted rows, shape (columns,) (definition 2 of Hyndman and Fan, 1996)."""
     count = share * len(values)
     whole = round(count)
-    if abs(count - whole) < 1e-9 * len(values):  # the share of a number may miss a whole number by roundoff
+    if abs(count - whole) < 1e-9 * len(values):  # equal up to roundoff
         return np.asarray(values[max(whole, 1) - 1 : whole + 1].mean(axis=0))
     return np.asarray(values[ceil(count) - 1])
 
 
-def _levels(curves: list[Curve]) -> Array:
-    """The intensities that all curves have, or a grid up to where all of them are known."""
+def _common_intensities(curves: list[Curve]) -> Array:
+    """The intensities of the fractiles: of the curves if equal in all, else a grid to the end of the shortest curve.
+
+    A curve with a run that ended early counts as longer than any other.
+    """
     first = np.unique(curves[0][0])
     if all(np.array_equal(np.unique(x), first) for x, _, _ in curves):
         return first
@@ -113,18 +120,21 @@ def _levels(curves: list[Curve]) -> Array:
 
 
 def _interpolated(levels: Array, x: Array, y: Array, ended: Any) -> Array:
-    """The demand of a curve at each level, linear between its runs; infinite beyond the last before one ended early."""
-    beyond = x[~ended].min(initial=np.inf)
-    known = ended & (x < beyond)
+    """The demand of a curve at intensities `levels`, linear between its runs, shape of `levels`.
+
+    Infinite beyond the last run before the first run that ended early.
+    """
+    first_early = x[~ended].min(initial=np.inf)
+    known = ended & (x < first_early)
     values = np.interp(levels, [0.0, *x[known]], [0.0, *y[known]])
     last = x[known].max(initial=0.0)
-    return np.where((levels > last) & np.isfinite(beyond), np.inf, values)
+    return np.where((levels > last) & np.isfinite(first_early), np.inf, values)
 
 
 def _curve_numbers(rows: Any, measure: str) -> Any:
-    """The number of the curve of each run, from 1: runs that have all axes but the intensity in common.
+    """The number of the curve of each run, from 1; runs of a curve have the values of all axes but the intensity equal.
 
-    The columns of the axes are those between `run` and `status`.
+    The axes are the columns between `run` and `status`.
     """
     names = list(rows.columns)
     check_columns(("run", "status"), names)
@@ -134,7 +144,7 @@ def _curve_numbers(rows: Any, measure: str) -> Any:
 
 
 def ida_table(result: Ida) -> Table:
-    """The fractiles for a terminal."""
+    """The fractiles as a table for a terminal."""
     rows = [
         [f"{row[result.measure]:.4g}", f"{row['curves']:.0f}", f"{row['ended_early']:.0f}"]
         + ["beyond" if np.isinf(row[name]) else f"{row[name]:.4g}" for name in result.shares]

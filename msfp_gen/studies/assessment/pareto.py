@@ -1,4 +1,7 @@
-"""Search for designs: the Pareto front of quantities over the random axes of a study, by NSGA-II of pymoo."""
+"""Search for designs: the Pareto front of quantities over the random axes of a study, by NSGA-II of pymoo.
+
+The designs of a generation become a study of listed samples on a pool; its rows give the objectives of the next one.
+"""
 
 from __future__ import annotations
 
@@ -32,18 +35,18 @@ from msfp_gen.studies.run import run_on
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LARGEST = 1e30  # objective of a design that is not feasible, so that every feasible one is better
+LARGEST = 1e30  # objective of a design without a value, so that every other design is better
 DESIGNS = "designs.parquet"
 Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class Goals:
-    """What a search is for.
+    """Objectives and limits of a search.
 
     Attributes:
-        minimise, maximise: quantities of the study.
-        at_most: quantity -> the largest value that a design may have.
+        minimise, maximise: quantities of the study, the objectives.
+        at_most: quantity -> largest value of a feasible design.
         statistic: of a quantity over the runs of a design: a key of STATISTICS.
     """
 
@@ -54,17 +57,17 @@ class Goals:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The objectives."""
+        """Names of the objectives."""
         return (*self.minimise, *self.maximise)
 
     @property
     def limits(self) -> dict[str, float]:
-        """The limits; empty without any."""
+        """Quantity -> largest value of a feasible design; may be empty."""
         return dict(self.at_most or {})
 
     @property
     def signs(self) -> Array:
-        """1 for an objective to be minimised, -1 for one to be maximised, shape (objectives,) [-]."""
+        """1 for an objective to be minimised, -1 for an objective to be maximised, shape (objectives,) [-]."""
         return np.array([1.0] * len(self.minimise) + [-1.0] * len(self.maximise))
 
 
@@ -73,10 +76,10 @@ class Front:
     """Result of `pareto`.
 
     Attributes:
-        goals: as given.
+        goals: of the search.
         units: column -> unit.
-        designs: DataFrame with one row for each design: `generation`, the axes, the statistics of objectives and
-            limits, `feasible`, and `front`, true for feasible designs that no other one dominates.
+        designs: DataFrame, one row for each design: `generation`, the axes, the statistics of objectives and limits,
+            `feasible`, and `front`, true for a feasible design that no other feasible design dominates.
     """
 
     goals: Goals
@@ -97,16 +100,16 @@ def pareto(
 ) -> Front:
     """Search the random axes of a study for the Pareto front of its quantities.
 
-    Each generation is a study of its own in `output`, so that the same call continues a search that was interrupted.
-    A design with a run that ended early is not feasible.
+    Each generation is a study of its own in `output`, so that the same call continues an interrupted search. A design
+    with a run that ended early is not feasible.
 
-    source: a study file, or a table; its random axes are the design variables, its other axes, such as records, the
-    runs of each design. `[sampling]` is not used. output: folder of the search: `designs.parquet`, and a folder for
-    each generation. goals: objectives and limits. population, generations, seed: of NSGA-II; designs are population x
-    generations. progress: called with the generations that are done, and all. engine: `workers`, `threads`,
+    source: a study file, or a table. Its random axes are the design variables; its other axes, such as records, give
+    the runs of each design; `[sampling]` is not used. output: folder of the search, with `designs.parquet` and a folder
+    for each generation. goals: objectives and limits. population, generations, seed: of NSGA-II; there are population x
+    generations designs. progress: called with the number of generations done, and of all. engine: `workers`, `threads`,
     `executor`, `dask` or `mpi`, as of `study`.
 
-    Raises InputError: invalid input; nothing was computed; RunError: workers died; the same call continues.
+    Raises InputError before any run: invalid input; RunError: workers died; the same call continues.
     """
     require("pymoo", "pymoo", "a Pareto search")
     study = load_study(source, design=True)
@@ -120,23 +123,23 @@ def pareto(
     problem = Problem(n_var=count, n_obj=len(goals.names), n_ieq_constr=limits, xl=0.0, xu=1.0)
     algorithm = NSGA2(pop_size=population)
     algorithm.setup(problem, termination=("n_gen", generations), seed=seed, verbose=False)
-    parts = []
+    evaluated = []
     with pool_from(**engine) as pool:
         for number in range(1, generations + 1):
-            asked = algorithm.ask()
-            shares = np.asarray(asked.get("X"), dtype=float)
-            parts.append(_evaluated(study, number, shares, goals, pool, Path(output)))
+            candidates = algorithm.ask()
+            shares = np.asarray(candidates.get("X"), dtype=float)
+            evaluated.append(_evaluate(study, number, shares, goals, pool, Path(output)))
             if number < generations:
-                objectives, violated = _objectives(parts[-1], goals)
-                Evaluator().eval(StaticProblem(problem, F=objectives, G=violated), asked)
-                algorithm.tell(infills=asked)
+                objectives, violations = _objectives(evaluated[-1], goals)
+                Evaluator().eval(StaticProblem(problem, F=objectives, G=violations), candidates)
+                algorithm.tell(infills=candidates)
                 if progress is not None:
                     progress(number, generations)
-    return _front(parts, goals, Path(output))
+    return _front(evaluated, goals, Path(output))
 
 
 def _check(study: Study, goals: Goals, population: int, generations: int) -> None:
-    """Raise InputError for a study without random axes, or for goals that it does not have."""
+    """Raise InputError for a study without random axes, or for goals with quantities that the study does not keep."""
     if not any(axis.random for axis in study.axes):
         raise InputError(
             "axes: none has a distribution, so that there is nothing to search; give its bounds as `uniform`"
@@ -151,21 +154,24 @@ def _check(study: Study, goals: Goals, population: int, generations: int) -> Non
             raise InputError(f"{word} = {value}: give {least} or more")
 
 
-def _evaluated(study: Study, number: int, shares: Array, goals: Goals, pool: Pool, folder: Path) -> Any:
-    """The designs of a generation with their statistics, as a DataFrame."""
+def _evaluate(study: Study, number: int, shares: Array, goals: Goals, pool: Pool, folder: Path) -> Any:
+    """Run the designs of a generation; returns a DataFrame with axes, statistics, `ended` and `feasible`.
+
+    shares: cumulative probabilities of the random axes, shape (designs, axes). `ended` is the share of complete runs.
+    """
     import pandas as pd
 
     values = values_at(shares, study.distributions)
     sampling = Sampling("listed", values=tuple(map(tuple, values.tolist())))
     table = {**study.table, "sampling": {"method": "listed", "values": values.tolist()}}
-    place = folder / f"generation-{number:03d}"
-    run_on(pool, replace(study, sampling=sampling, table=table), place)
-    wanted = list(dict.fromkeys((*goals.names, *goals.limits)))
-    rows = read_study(place, wanted)
+    own_folder = folder / f"generation-{number:03d}"
+    run_on(pool, replace(study, sampling=sampling, table=table), own_folder)
+    quantities = list(dict.fromkeys((*goals.names, *goals.limits)))
+    rows = read_study(own_folder, quantities)
     axes = [axis.name for axis in study.axes if axis.random]
     shape = (-1, len(values))
     reduce = STATISTICS[goals.statistic]
-    statistics = {name: reduce(numbers(rows, name).reshape(shape), axis=0) for name in wanted}
+    statistics = {name: reduce(numbers(rows, name).reshape(shape), axis=0) for name in quantities}
     ended = complete(rows).reshape(shape)
     feasible = ended.all(axis=0) & ~np.isnan(list(statistics.values())).any(axis=0)
     for name, bound in goals.limits.items():
@@ -177,58 +183,65 @@ def _evaluated(study: Study, number: int, shares: Array, goals: Goals, pool: Poo
 
 
 def _objectives(designs: Any, goals: Goals) -> tuple[Array, Array]:
-    """Objectives to be minimised, and limits that are violated above zero, of the designs of a generation."""
+    """Objectives to be minimised, shape (designs, objectives), and violations, positive where a limit is violated.
+
+    The violations, shape (designs, 1 + limits), begin with the share of runs that ended early.
+    """
     values = designs[list(goals.names)].to_numpy() * goals.signs
     unknown = (designs.ended < 1).to_numpy() | np.isnan(values).any(axis=1)
-    violated = [1.0 - designs.ended.to_numpy()]
+    violations = [1.0 - designs.ended.to_numpy()]
     for name, bound in goals.limits.items():
         excess = (designs[name].to_numpy() - bound) / (abs(bound) or 1.0)
-        violated.append(np.where(np.isnan(excess), LARGEST, excess))
-    return np.where(unknown[:, None], LARGEST, values), np.column_stack(violated)
+        violations.append(np.where(np.isnan(excess), LARGEST, excess))
+    return np.where(unknown[:, None], LARGEST, values), np.column_stack(violations)
 
 
-def _front(parts: Sequence[Any], goals: Goals, folder: Path) -> Front:
+def _front(generations: Sequence[Any], goals: Goals, folder: Path) -> Front:
+    """The front of the designs of all generations; writes `designs.parquet`."""
     import pandas as pd
 
-    designs = pd.concat([part.drop(columns="ended") for part in parts], ignore_index=True)
+    designs = pd.concat([frame.drop(columns="ended") for frame in generations], ignore_index=True)
     designs["front"] = designs.feasible.to_numpy() & not_dominated(
         np.where(designs.feasible.to_numpy()[:, None], designs[list(goals.names)].to_numpy() * goals.signs, np.inf)
     )
     write_frame(designs, folder / DESIGNS)
-    return Front(goals, dict(parts[0].attrs["units"]), designs)
+    return Front(goals, dict(generations[0].attrs["units"]), designs)
 
 
 def not_dominated(values: Array) -> Any:
-    """Of each row whether no other is at most equal in all columns and less in one, ndarray of bool."""
-    better = np.zeros(len(values), dtype=bool)
+    """Whether no other row dominates a row, ndarray of bool, shape (rows,).
+
+    A row dominates another if it is at most equal in all columns and less in one.
+    """
+    dominated = np.zeros(len(values), dtype=bool)
     for index, row in enumerate(values):
-        better[index] = ((values <= row).all(axis=1) & (values < row).any(axis=1)).any()
-    return ~better
+        dominated[index] = ((values <= row).all(axis=1) & (values < row).any(axis=1)).any()
+    return ~dominated
 
 
 def front_table(front: Front) -> Table:
-    """The front for a terminal, sorted by its first objective."""
-    chosen = front.designs[front.designs.front].sort_values(front.goals.names[0])
-    columns = [name for name in chosen.columns if name not in ("generation", "feasible", "front")]
-    rows = [[f"{value:.4g}" for value in row] for row in chosen[columns].to_numpy()]
+    """The designs on the front as a table for a terminal, sorted by the first objective."""
+    designs = front.designs[front.designs.front].sort_values(front.goals.names[0])
+    columns = [name for name in designs.columns if name not in ("generation", "feasible", "front")]
+    rows = [[f"{value:.4g}" for value in row] for row in designs[columns].to_numpy()]
     count, feasible = len(front.designs), int(front.designs.feasible.sum())
-    title = f"{len(chosen)} designs on the Pareto front, of {feasible} feasible ones among {count}"
+    title = f"{len(designs)} designs on the Pareto front, of {feasible} feasible ones among {count}"
     return Table(title, columns, rows)
 
 
 def plot_pareto(result: Front, path: str | Path | None = None, title: str = "") -> Figure:
-    """The first two objectives: all designs, and those on the front joined by a line. path: as of `page`."""
+    """All designs over the first two objectives; a line joins the designs on the front. path: as of `page`."""
     first, second = result.goals.names[:2]
     designs, front = result.designs, result.designs[result.designs.front].sort_values(first)
     scales = [scale_of(designs[name], result.units.get(name, "")) for name in (first, second)]
     with page(*SIZE, path) as figure:
         headline(figure, title or "Pareto front")
         axes = figure.subplots()
-        for chosen, marker, colour, label in (
+        for kind, marker, colour, label in (
             (designs[~designs.feasible], "x", PALE, "not feasible"),
             (designs[designs.feasible & ~designs.front], ".", FAINT, "dominated"),
         ):
-            x, y = (scale.factor * chosen[name] for scale, name in zip(scales, (first, second), strict=True))
+            x, y = (scale.factor * kind[name] for scale, name in zip(scales, (first, second), strict=True))
             axes.plot(x, y, marker, color=colour, label=label)
         x, y = (scale.factor * front[name] for scale, name in zip(scales, (first, second), strict=True))
         line = "-" if len(result.goals.names) == 2 else "none"

@@ -1,4 +1,7 @@
-"""The rows of a study as a table of pandas, the columns that evaluations take from it, and what their figures share."""
+"""The rows of a study as a DataFrame, its columns as arrays, and labels and scales of the figures of evaluations.
+
+The parts in the folder of a study come in; every evaluation of a study begins with the DataFrame that goes out.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +29,11 @@ STATISTICS: dict[str, Callable[..., Any]] = {
 
 
 def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
-    """The rows of a study as a pandas.DataFrame, sorted by run; those that are not computed yet are not in it.
+    """The rows that a study has so far, as a pandas.DataFrame, sorted by run.
 
-    columns: only these, and `run` and `status`; None: all. Units are in `DataFrame.attrs["units"]`; `attrs["chosen"]`
-    says whether an estimate chose the runs. Raises InputError: no study there, no rows yet, or an unknown column.
+    columns: to be read beside `run` and `status`; None: all. `DataFrame.attrs["units"]` has the units, and
+    `attrs["chosen"]` states whether an estimate chose the runs. Raises InputError: the folder has no study, the study
+    has no rows yet, or a column is unknown.
     """
     import pyarrow.dataset as ds
 
@@ -51,7 +55,7 @@ def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
 
 
 def chosen_rows(rows: Any, conditions: Sequence[str]) -> Any:
-    """The rows in which columns have the values of all conditions, such as `bounds=upper`. Raises InputError."""
+    """The rows that meet all conditions on columns, such as `bounds=upper`. Raises InputError."""
     for text in conditions:
         name, equals, value = text.partition("=")
         if not equals:
@@ -60,19 +64,19 @@ def chosen_rows(rows: Any, conditions: Sequence[str]) -> Any:
         column = rows[name]
         if column.dtype.kind == "f":
             try:
-                chosen = np.isclose(column, float(value), rtol=1e-9, atol=0.0)
+                matches = np.isclose(column, float(value), rtol=1e-9, atol=0.0)
             except ValueError:
                 raise InputError(f"{text!r}: {name} holds numbers; give one") from None
         else:
-            chosen = np.asarray(column.astype(str) == value)
-        if not chosen.any():
+            matches = np.asarray(column.astype(str) == value)
+        if not matches.any():
             raise InputError(f"{text!r}: no run has this value")
-        rows = rows[chosen]
+        rows = rows[matches]
     return rows.reset_index(drop=True)
 
 
 def write_frame(frame: Any, path: str | Path, name: str = "output") -> Path:
-    """Write a DataFrame by `write_columns`, whose arguments and errors these are; without units."""
+    """Write a DataFrame without units; path, name and errors as of `write_columns`."""
     columns = frame.astype(object).where(frame.notna(), None).items()
     return write_columns(path, {(column, ""): values.tolist() for column, values in columns}, name)
 
@@ -87,13 +91,13 @@ def check_columns(names: Iterable[str], known: Iterable[str]) -> None:
 
 
 def check_share(name: str, value: float) -> None:
-    """Raise InputError for a level of confidence out of range."""
+    """Raise InputError for a share, such as a level of confidence, that is not between 0 and 1."""
     if not 0 < value < 1:
         raise InputError(f"{name} = {value:g}: give a share between 0 and 1, such as 0.95")
 
 
 def numbers(rows: Any, name: str) -> Array:
-    """A column as floats, shape (runs,) [its unit]; NaN: no value. Raises InputError: no such column, or texts."""
+    """A column as floats, shape (runs,) [its unit]; NaN: no value. Raises InputError: unknown column, or texts."""
     check_columns([name], rows.columns)
     try:
         return np.asarray(rows[name], dtype=float)
@@ -110,7 +114,7 @@ def intensities(rows: Any, name: str) -> Array:
 
 
 def demands(rows: Any, name: str) -> Array:
-    """A column as demands, shape (runs,) [its unit]: of runs that ended early a lower bound, zero if they have none.
+    """A column as demands, shape (runs,) [its unit]; for a run that ended early a lower bound, 0 without a value.
 
     Raises InputError where a run that reached its end has no value, and for runs that an estimate chose.
     """
@@ -119,15 +123,14 @@ def demands(rows: Any, name: str) -> Array:
             f"{name}: the runs of an estimate were chosen where they decide most, which a curve through them does not "
             "know; give --estimate with --statistic fragility and a threshold, or run the study without an estimate"
         )
-    values, ended = numbers(rows, name), complete(rows)
-    if np.isnan(values[ended]).any():
-        count = int(np.isnan(values[ended]).sum())
+    values = numbers(rows, name)
+    if count := int(np.isnan(values[complete(rows)]).sum()):
         raise InputError(f"{name}: {count} runs reached their end without a value; give another quantity")
     return np.where(np.isnan(values), 0.0, values)
 
 
 def complete(rows: Any) -> Any:
-    """Whether each run reached its end, ndarray of bool."""
+    """Whether each run reached its end, ndarray of bool, shape (runs,)."""
     return np.asarray(rows["status"] == COMPLETE)
 
 
@@ -142,7 +145,7 @@ def labelled(name: str, unit: str) -> str:
 
 
 def scale_of(values: Any, unit: str) -> Scale:
-    """Lengths in mm, other quantities with a prefix, plain numbers as they are."""
+    """The scale in which values are shown: lengths in mm, other quantities with a prefix, plain numbers unscaled."""
     if unit == "m":
         return Scale(1e3, "mm")
     finite: Array = np.asarray(values, dtype=float)

@@ -1,4 +1,4 @@
-"""Sensitivity of a quantity to the random axes of a study: tornado and Sobol' indices."""
+"""Sensitivity of a quantity to the random axes, from the rows of a study: tornado and Sobol' indices."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Bar:
-    """One axis of a tornado: its two values, and the quantity at each, with all other axes at their medians."""
+    """A bar of a tornado, with all other axes at their medians.
+
+    axis: its name. low, high: the two values of the axis. at_low, at_high: the quantity at these values.
+    """
 
     axis: str
     low: float
@@ -42,13 +45,17 @@ class Bar:
 
     @property
     def swing(self) -> float:
-        """The difference of the quantity between both."""
+        """The difference of the quantity between the two values of the axis [unit of the quantity]."""
         return abs(self.at_high - self.at_low)
 
 
 @dataclass(frozen=True)
 class Tornado:
-    """Result of `tornado`: the quantity at the medians of all axes, and the bars, the longest first."""
+    """Result of `tornado`.
+
+    name, unit, statistic: of the quantity. quantiles: of each axis, low and high. base: the quantity at the medians of
+    all axes. bars: the longest first.
+    """
 
     name: str
     unit: str
@@ -65,10 +72,10 @@ class Sobol:
     Attributes:
         name, unit, statistic: of the quantity.
         axes: names of the random axes, by falling total index.
-        first, total: first-order and total index of each axis.
-        first_interval, total_interval: half-widths of their confidence intervals.
-        level: of confidence.
-        samples: base samples.
+        first, total: first-order and total index of each axis [-].
+        first_interval, total_interval: half the widths of the confidence intervals of these indices [-].
+        level: of confidence [-].
+        samples: number of base samples.
     """
 
     name: str
@@ -84,10 +91,10 @@ class Sobol:
 
 
 def by_sample(folder: str | Path, name: str, statistic: str, method: str) -> Any:
-    """The values of the random axes, and in the last column the statistic of a quantity over the runs of each sample.
+    """The samples of a study as a DataFrame: random axes, and last the statistic of a quantity over the runs of each.
 
-    A DataFrame with a row for each sample; `attrs` has the `unit` of the quantity and the table `sampling` of the
-    study. Raises InputError: another sampling method, runs that are missing or ended early, or a run without a value.
+    `attrs` has the `unit` of the quantity and the table `sampling` of the study. method: of sampling that the study
+    must have. Raises InputError: another method, runs that are missing or ended early, or a run without a value.
     """
     if statistic not in STATISTICS:
         raise InputError(f"statistic = {statistic!r}: give one of {', '.join(STATISTICS)}")
@@ -114,8 +121,8 @@ def by_sample(folder: str | Path, name: str, statistic: str, method: str) -> Any
 def tornado(folder: str | Path, name: str, statistic: str = "median") -> Tornado:
     """The change of a quantity with each random axis alone.
 
-    folder: of a study with `sampling.method = "one-at-a-time"`. statistic: over all runs of a sample, such as those of
-    several records: "median", "mean", "max" or "min". Raises InputError.
+    folder: of a study with `sampling.method = "one-at-a-time"`. statistic: over all runs of a sample, such as the runs
+    of several records: "median", "mean", "max" or "min". Raises InputError.
     """
     samples = by_sample(folder, name, statistic, "one-at-a-time")
     low, high = samples.attrs["sampling"].get("quantiles", Sampling("one-at-a-time").quantiles)
@@ -156,7 +163,7 @@ def sobol(folder: str | Path, name: str, statistic: str = "median", level: float
 
 
 def tornado_table(result: Tornado) -> Table:
-    """The bars for a terminal."""
+    """The bars as a table for a terminal."""
     rows = [
         (bar.axis, f"{bar.low:.4g}", f"{bar.high:.4g}", f"{bar.at_low:.4g}", f"{bar.at_high:.4g}", f"{bar.swing:.4g}")
         for bar in result.bars
@@ -170,7 +177,7 @@ def tornado_table(result: Tornado) -> Table:
 
 
 def sobol_table(result: Sobol) -> Table:
-    """The indices for a terminal."""
+    """The indices as a table for a terminal."""
     columns = (result.first, result.first_interval, result.total, result.total_interval)
     rows = [
         (axis, f"{first:.3f}", f"± {of_first:.3f}", f"{total:.3f}", f"± {of_total:.3f}")
