@@ -1,4 +1,7 @@
-"""Property-modification factors (lambda): tables in TOML, and the rules by which codes combine them."""
+"""Property-modification factors (lambda): read from tables in TOML, and combined by the rule of a code.
+
+First step of a bounding analysis; `runs.py` multiplies the properties of a scene by the combined factors.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +25,8 @@ class Rule(NamedTuple):
     """How a code combines factors.
 
     Attributes:
-        separately: whether the adjustment reduces each environmental factor, or their product.
-        adjustment: value that the code fixes; None if the table gives it.
+        separately: whether the adjustment reduces each environmental factor; otherwise it reduces their product.
+        adjustment: value that the code fixes [-]; None if the table gives it.
         formula: the rule as text.
         remedy: values to give, for error messages.
     """
@@ -49,7 +52,7 @@ RULES = {
         "give f_a: 1.00, 0.75 or 0.66 for critical, essential or other bridges",
     ),
 }
-# Property -> the fields of `Surface` that its factor multiplies; a friction law may have two coefficients.
+# Property -> fields of `Surface` that its factor multiplies; a friction law may have two coefficients.
 PROPERTIES = {
     "friction": ("friction", "friction_slow"),
     "yield_displacement": ("yield_displacement",),
@@ -65,14 +68,14 @@ _FACTOR_KEYS = ("property", "surfaces", "environment", "direct")
 
 @dataclass(frozen=True)
 class Factor:
-    """Causes that change one property of surfaces, each with its factors (least, most).
+    """The causes that change one property of surfaces.
 
     Attributes:
         property: a key of PROPERTIES.
-        surfaces: 1..n-1; empty for all surfaces.
-        environment: cause -> factors, such as ageing, contamination and temperature. Codes reduce these, since they
-            seldom occur together.
-        direct: cause -> factors that codes do not reduce, such as tests and specification.
+        surfaces: numbers of the surfaces, 1..n-1; empty for all surfaces.
+        environment: cause, such as ageing, contamination or temperature -> (least, most) factor [-]. Codes reduce these
+            factors, since the causes seldom occur together.
+        direct: cause, such as tests or specification -> (least, most) factor [-], which codes do not reduce.
     """
 
     property: str
@@ -87,11 +90,11 @@ class FactorTable:
 
     Attributes:
         name: of the table or file.
-        description, source: text.
+        description, source: texts.
         rule: a key of RULES.
         adjustment: system property adjustment factor of the rule [-].
-        limits: upper limit of lambda_min and lower limit of lambda_max; None without limits.
-        factors: the factors.
+        limits: upper limit of lambda_min and lower limit of lambda_max [-]; None without limits.
+        factors: of all properties.
     """
 
     name: str
@@ -103,7 +106,7 @@ class FactorTable:
     factors: tuple[Factor, ...]
 
     def combined(self, factor: Factor) -> Pair:
-        """(lambda_min, lambda_max) of `factor` by the rule and the limits of this table."""
+        """(lambda_min, lambda_max) of a factor by the rule and the limits of this table [-]."""
         low, high = (self._combined(factor, end) for end in (0, 1))
         return (low, high) if self.limits is None else (min(low, self.limits[0]), max(high, self.limits[1]))
 
@@ -129,9 +132,9 @@ def factor_text(name: str) -> str:
 
 
 def load_factors(source: str | Path) -> FactorTable:
-    """The table in a TOML file, or the one of that name that comes with the package.
+    """Read a table of factors. source: a TOML file, or the name of a table that comes with the package.
 
-    Raises InputError with one line that names file, field, value and remedy.
+    Raises InputError of one line that names file, field, value and remedy.
     """
     path = Path(source)
     if str(source) in _bundled() or not is_input(path):
@@ -148,7 +151,7 @@ def _bundled() -> dict[str, str]:
 
 
 def _read(name: str, table: Mapping[str, Any]) -> FactorTable:
-    """Check the table of a TOML file."""
+    """Check and read the table of a TOML file. Raises InputError."""
     check_whole_numbers(table)
     known_keys(table, _TABLE_KEYS, "")
     rule = _choice(table.get("rule"), RULES, "rule")
@@ -168,16 +171,16 @@ def _read(name: str, table: Mapping[str, Any]) -> FactorTable:
 
 
 def _factor(row: Mapping[str, Any], path: str) -> Factor:
-    """Parse one table [[factor]]; `path` names it in messages."""
+    """Read a table [[factor]]. path: of the table, for messages. Raises InputError."""
     known_keys(row, _FACTOR_KEYS, f"{path}.")
-    named = _choice(row.get("property"), PROPERTIES, f"{path}.property")
+    property_name = _choice(row.get("property"), PROPERTIES, f"{path}.property")
     surfaces = parsed(_SURFACES, row.get("surfaces", []), f"{path}.surfaces")
     if "surfaces" in row and not surfaces:
         raise InputError(f"{path}.surfaces = []: give numbers of surfaces, from 1, or leave it out for all")
     causes = {key: _causes(row.get(key, {}), f"{path}.{key}") for key in ("environment", "direct")}
     if not any(causes.values()):
         raise InputError(f"{path}: no causes; give environment or direct, such as {{ ageing = [1.0, 1.3] }}")
-    return Factor(named, surfaces, **causes)
+    return Factor(property_name, surfaces, **causes)
 
 
 def _causes(table: Any, path: str) -> dict[str, Pair]:
@@ -187,7 +190,7 @@ def _causes(table: Any, path: str) -> dict[str, Pair]:
 
 
 def _pair(value: Any, path: str) -> Pair:
-    """A pair (least <= 1, most >= 1): the scene itself is the nominal case."""
+    """Read (least, most). Raises InputError unless the pair encloses 1, since the scene is the nominal case."""
     low, high = parsed(_PAIR, value, path)
     if not low <= 1 <= high:
         raise InputError(

@@ -1,4 +1,8 @@
-"""Runs of a scene at lower bound, nominal and upper bound properties: quantities by case, tables, CSV, loops."""
+"""Runs of a scene at lower bound, nominal and upper bound of its properties, and their comparison.
+
+A scene and a table of factors come in; `bound` runs the three cases in a batch; quantities by case go out, as tables,
+CSV and a figure of the loops.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +54,7 @@ if TYPE_CHECKING:
 
 STOPPED = "the run met the stop condition of the scene"
 CASES = ("lower", "nominal", "upper")
-# Word in the name of a model -> the effect that is then prescribed for all cases.
+# Word in the name of a model -> (field of `Auto`, value) that gives the effect to all cases.
 WIDER: dict[str, tuple[str, Any]] = {
     "spatial": ("dimension", "spatial"),
     "inertial": ("sliders", "inertial"),
@@ -66,11 +70,11 @@ class Case:
     """One run of a bounding analysis.
 
     Attributes:
-        name: "lower", "nominal" or "upper".
-        scene: the scene with its properties multiplied.
-        result: the run; of a run that failed its rows until then, None if it has none.
-        characterisation: None if the run failed.
-        failure: message of a failure, else empty.
+        name: one of CASES.
+        scene: with the properties multiplied.
+        result: of the run; if the run failed, with the rows until then, or None without rows.
+        characterisation: of the run; None if the run failed.
+        failure: message of the run that failed, else "".
     """
 
     name: str
@@ -80,24 +84,24 @@ class Case:
     failure: str = ""
 
     def value(self, source: Source) -> float | None:
-        """A quantity in SI; None where the run failed or it is not defined."""
+        """The value of a quantity [SI]; None where the run failed or the quantity is undefined."""
         if self.result is None or self.characterisation is None:
             return None
         return source.value(self.result.summary, self.characterisation)  # type: ignore[no-any-return]
 
     @property
     def stopped_at(self) -> float | None:
-        """Time at which the run met the stop condition of its scene [s]; None: it did not."""
+        """Time at which the run met the stop condition of its scene [s]; None if it did not."""
         result = self.result
         return float(result.summary["duration"]) if result is not None and result.status == "stopped" else None
 
     @property
     def verdict(self) -> str:
-        """The verdict of the run, and whether it is of a part of the motion only."""
+        """The verdict of the run as text, with the time of the stop condition if the run met it."""
         if self.result is None:
             return "the run failed"
-        met = "" if self.stopped_at is None else f"; {STOPPED} at {self.stopped_at:.4g} s"
-        return self.result.verdict.text + met
+        stop = "" if self.stopped_at is None else f"; {STOPPED} at {self.stopped_at:.4g} s"
+        return self.result.verdict.text + stop
 
 
 @dataclass(frozen=True)
@@ -105,9 +109,9 @@ class Bounds:
     """Result of `bound`.
 
     Attributes:
-        table: the table of factors.
-        lambdas: property -> case -> factor of every surface, bottom first.
-        cases: the runs.
+        table: of factors.
+        lambdas: property -> case -> factor of every surface, bottom first [-].
+        cases: in the order of CASES.
     """
 
     table: FactorTable
@@ -121,47 +125,47 @@ class Bounds:
 
     @property
     def bearing(self) -> Bearing:
-        """The nominal bearing; of a building that with the most surfaces."""
+        """The nominal bearing; of a building the bearing with the most surfaces."""
         return _typical(next(case for case in self.cases if case.name == "nominal").scene)
 
     @property
     def compared(self) -> dict[str, Source]:
-        """Name -> quantity that is compared; loop properties are cycle means."""
+        """Column -> quantity that the cases are compared by; properties of loops are means over the cycles."""
         counts = Counts.of(self.cases[0].scene)
         return {name: source for name, source in catalogue(counts).items() if source.compared}
 
     def quantities(self) -> dict[str, dict[str, float | None]]:
-        """Quantity -> case -> value in SI; None where a run failed or the quantity is not defined in it."""
+        """Quantity -> case -> value [SI]; None where the run failed or the quantity is undefined."""
         return {name: {case.name: case.value(source) for case in self.cases} for name, source in self.compared.items()}
 
     def undefined(self) -> dict[str, str]:
-        """Quantity -> the cases without a value, and why; only where the reason is known."""
+        """Quantity -> cases without a value and the reason, where it is known, as text."""
         reasons = {
-            name: {c.name: why for c in self.cases if (why := source.reason(c.characterisation))}
+            name: {case.name: reason for case in self.cases if (reason := source.reason(case.characterisation))}
             for name, source in self.compared.items()
         }
-        return {name: f"{', '.join(why)}: {next(iter(why.values()))}" for name, why in reasons.items() if why}
+        return {name: f"{', '.join(cases)}: {next(iter(cases.values()))}" for name, cases in reasons.items() if cases}
 
     def verdicts(self) -> dict[str, str]:
         """Case -> the verdict of its run."""
         return {case.name: case.verdict for case in self.cases}
 
     def governing(self) -> dict[str, str]:
-        """Quantity -> the case that governs; left out if a case has no value, or all have the same."""
-        worst = {}
+        """Quantity -> the case that governs; without quantities where a case has no value, or all values are equal."""
+        governing = {}
         for name, values in self.quantities().items():
             known = {case: value for case, value in values.items() if value is not None}
             governs = self.compared[name].quantity.governs
             if governs and len(known) == len(values) and len(set(known.values())) > 1:
-                pick = max if governs == "most" else min
-                worst[name] = pick(known, key=known.__getitem__)
-        return worst
+                extreme = max if governs == "most" else min
+                governing[name] = extreme(known, key=known.__getitem__)
+        return governing
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON: factors, quantities by case, governing cases, and each characterisation."""
-        of_table = ("name", "description", "source", "rule", "adjustment")
+        fields = ("name", "description", "source", "rule", "adjustment")
         return {
-            "factors": {**{name: getattr(self.table, name) for name in of_table}, "lambdas": self.lambdas},
+            "factors": {**{name: getattr(self.table, name) for name in fields}, "lambdas": self.lambdas},
             "quantities": self.quantities(),
             "governing": self.governing(),
             "undefined": self.undefined(),
@@ -178,10 +182,10 @@ class Bounds:
 
 
 def bound(scene: AnyScene, table: FactorTable, *, progress: Progress | None = None) -> Bounds:
-    """Run `scene` at lower bounds, nominal values and upper bounds of its properties; of a building of all bearings.
+    """Run a scene with its properties at lower bound, nominal value and upper bound; of a building, of all bearings.
 
     A case that fails is part of the result, and the other cases are run. All cases have the same effects: where `Auto`
-    ends with different ones, they are run again with what any of them needs.
+    ends with different models, all cases run again with every effect that any of them needs.
 
     progress: called with the share of the runs that is done, and 1. Raises InputError: a factor of a surface that the
     bearing does not have, a pendulum that is "equivalent" to a stack, or a bearing that does not move; RunError: no
@@ -201,12 +205,12 @@ def _common_effects(scene: Scene, cases: Sequence[Case]) -> Auto | None:
     models = [set(result.provenance["model"].split(", then ")[-1].split("-")) for result in results]
     if all(model == models[0] for model in models):
         return None
-    used = set().union(*models)
-    return replace(scene.effects, **{name: value for word, (name, value) in WIDER.items() if word in used})
+    words = set().union(*models)
+    return replace(scene.effects, **{name: value for word, (name, value) in WIDER.items() if word in words})
 
 
 def _cases(scene: AnyScene, table: FactorTable, progress: Progress | None) -> list[Case]:
-    """The runs of `bound`, at the same time."""
+    """Run the cases of a scene at the same time. Raises RunError where no case has rows."""
     scenes = bounded_scenes(scene, table)
     with closing(completed_runs(list(scenes.values()), labels=list(scenes), progress=progress)) as runs:
         results = dict(runs)
@@ -226,20 +230,22 @@ def _case(name: str, scene: AnyScene, result: Any) -> Case:
 def bounded_scenes(scene: AnyScene, table: FactorTable) -> dict[str, AnyScene]:
     """Case -> the scene with its properties multiplied; "nominal" is `scene` itself.
 
-    The bearings of a building begin with the same effects in all cases, nominal too: with uplift where any case needs
-    it. Raises InputError as `bound`.
+    A bearing of a building begins with the same effects in all cases: with uplift in all if it has uplift in any, the
+    nominal case included. Raises InputError as `bound`.
     """
     scenes = {case: bounded_scene(scene, table, case) for case in CASES}
     buildings = {case: bounded for case, bounded in scenes.items() if isinstance(bounded, BuildingScene)}
-    lifting = np.any([[effects.uplift for effects in bounded.modelled] for bounded in buildings.values()], axis=0)
-    return scenes | {case: _lifting(bounded, lifting) for case, bounded in buildings.items()}
+    uplift = np.any([[effects.uplift for effects in bounded.modelled] for bounded in buildings.values()], axis=0)
+    return scenes | {case: _with_uplift(bounded, uplift) for case, bounded in buildings.items()}
 
 
-def _lifting(scene: BuildingScene, lifting: Sequence[bool]) -> BuildingScene:
-    """The scene with uplift from the start in some of its bearings; the others may take it in on the way."""
+def _with_uplift(scene: BuildingScene, uplift: Sequence[bool]) -> BuildingScene:
+    """The scene with uplift from the start in the flagged bearings; the other bearings may switch to it in the run."""
     bearings = [
-        replace(one, effects=replace(one.effects or Auto(), uplift=True)) if lifts and not effects.uplift else one
-        for one, lifts, effects in zip(scene.bearings, lifting, scene.modelled, strict=True)
+        replace(mount, effects=replace(mount.effects or Auto(), uplift=True))
+        if flagged and not effects.uplift
+        else mount
+        for mount, flagged, effects in zip(scene.bearings, uplift, scene.modelled, strict=True)
     ]
     return scene if bearings == list(scene.bearings) else replace(scene, bearings=bearings)
 
@@ -249,7 +255,7 @@ def bounded_scene(scene: AnyScene, table: FactorTable, case: str) -> AnyScene:
     check_stack(scene)
     label = f"{scene.name or 'scene'}, {case}"
     if isinstance(scene, Scene):
-        bearing = _bounded(scene.bearing, scene.law[1], table, case)
+        bearing = _bounded_bearing(scene.bearing, scene.law[1], table, case)
         return scene if case == "nominal" else replace(scene, bearing=bearing, name=label)
     bearings = []
     for index, mount in enumerate(scene.bearings):
@@ -257,40 +263,40 @@ def bounded_scene(scene: AnyScene, table: FactorTable, case: str) -> AnyScene:
         formula = requested.friction_law
         word = requested.friction or select_friction(mount.bearing, formula)
         with prefixed(f"{scene.label(index)}: "):
-            bearing = _bounded(mount.bearing, law_of(word, formula), table, case)
+            bearing = _bounded_bearing(mount.bearing, law_of(word, formula), table, case)
         bearings.append(replace(mount, bearing=bearing))
     return scene if case == "nominal" else replace(scene, bearings=bearings, name=label)
 
 
-def _bounded(bearing: Bearing, law: Law | None, table: FactorTable, case: str) -> Bearing:
-    """A bearing with its properties multiplied."""
+def _bounded_bearing(bearing: Bearing, law: Law | None, table: FactorTable, case: str) -> Bearing:
+    """The bearing with its properties multiplied. law: its friction law. Raises InputError."""
     lambdas = _lambdas(bearing, table)
     if "friction" in lambdas and law is not None and not proportional(law, bearing):
         raise InputError(
             f"effects.friction_law = {law.text!r}: lambda factors multiply `friction`, to which this formula is not "
             "proportional; give a formula of the form mu * (...)"
         )
-    for named, factors in lambdas.items():
-        for column in PROPERTIES[named]:
-            bearing = _scaled(bearing, column, factors[case])
+    for name, factors in lambdas.items():
+        for field in PROPERTIES[name]:
+            bearing = _scaled(bearing, field, factors[case])
     return bearing
 
 
 def _typical(scene: AnyScene) -> Bearing:
-    """The bearing of a scene; of a building that with the most surfaces."""
+    """The bearing of a scene; of a building the bearing with the most surfaces."""
     return max(scene.every_bearing, key=lambda bearing: len(bearing.surfaces))
 
 
-def _scaled(bearing: Bearing, column: str, factors: tuple[float, ...]) -> Bearing:
-    """`bearing` with a field of its surfaces multiplied by `factors`; unchanged if the surfaces have no such value."""
-    values: list[Any] = [getattr(surface, column, None) for surface in bearing.surfaces]
+def _scaled(bearing: Bearing, field: str, factors: tuple[float, ...]) -> Bearing:
+    """The bearing with a field of its surfaces multiplied by `factors`; unchanged if a surface has no such value."""
+    values: list[Any] = [getattr(surface, field, None) for surface in bearing.surfaces]
     if any(value is None for value in values):
         return bearing
-    return bearing.replace(**{column: [value * factor for value, factor in zip(values, factors, strict=True)]})
+    return bearing.replace(**{field: [value * factor for value, factor in zip(values, factors, strict=True)]})
 
 
 def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[float, ...]]]:
-    """Property -> case -> factor of every surface; 1 for a surface without a factor."""
+    """Property -> case -> factor of every surface [-]; 1 for a surface without a factor. Raises InputError."""
     count = bearing.layout.surfaces
     pairs: dict[str, dict[int, tuple[float, float]]] = {}
     for index, factor in enumerate(table.factors):
@@ -305,9 +311,9 @@ def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[
                 )
             of_surfaces[surface] = table.combined(factor)
     lambdas = {}
-    for named, of_surfaces in pairs.items():
+    for name, of_surfaces in pairs.items():
         lower, upper = zip(*(of_surfaces.get(surface, (1.0, 1.0)) for surface in range(1, count + 1)), strict=True)
-        lambdas[named] = {"lower": lower, "nominal": (1.0,) * count, "upper": upper}
+        lambdas[name] = {"lower": lower, "nominal": (1.0,) * count, "upper": upper}
     return lambdas
 
 
@@ -321,17 +327,17 @@ SHOWN = {
     "W/m^2": ("kW/m2", 1e-3),
     "": ("%", 100.0),
 }
-# In the order of drawing: the nominal loop lies on top. Solid lines, since repeated cycles would fill dashes.
+# In the order of drawing, so that the nominal loop is on top. Solid lines, since repeated cycles would fill dashes.
 LINE_COLOURS = {"lower": COLOURS[0], "upper": COLOURS[1], "nominal": INK}
 
 
 def shown_as(unit: str) -> tuple[str, float]:
-    """The unit in which a value in SI is shown, and the factor to it."""
+    """The unit in which a value of an SI unit is shown, and the factor from the SI unit to it."""
     return SHOWN.get(unit, (unit, 1.0))
 
 
 def bounding_tables(bounds: Bounds) -> list[Table]:
-    """Tables of the factors, of the factors by surface, of quantities and verdicts by case, and of runs that failed."""
+    """Tables of factors, lambdas by surface, quantities and verdicts by case, failed runs, and undefined quantities."""
     failed = [(case.name, case.failure) for case in bounds.cases if case.failure]
     unknown = [(name.replace("_", " "), why) for name, why in bounds.undefined().items()]
     extra = [Table("runs that failed", (), failed)] if failed else []
@@ -382,11 +388,11 @@ def _lambda_table(bounds: Bounds) -> Table:
     nominal = bounds.bearing.surfaces
     rows = [
         (
-            f"{named} {surface + 1}",
+            f"{name} {surface + 1}",
             *(f"{factors[case][surface]:.4g}" for case in CASES),
-            *(f"{factors[case][surface] * getattr(nominal[surface], named):.4g}" for case in CASES),
+            *(f"{factors[case][surface] * getattr(nominal[surface], name):.4g}" for case in CASES),
         )
-        for named, factors in bounds.lambdas.items()
+        for name, factors in bounds.lambdas.items()
         for surface in range(len(nominal))
     ]
     return Table("lambda of every surface, and property times lambda [SI]", ("", *CASES, *CASES), rows)
@@ -406,7 +412,7 @@ def _quantity_table(bounds: Bounds) -> Table:
 def plot_bounds(bounds: Bounds, path: str | Path | None = None) -> Figure:
     """Top force [kN] over displacement across the bearing [mm] of all cases, along each axis that moves.
 
-    A run that failed is drawn up to its last row, one without rows is left out. Raises InputError for a path that
+    A run that failed is drawn up to its last row; a run without rows is not drawn. Raises InputError for a path that
     cannot be written.
     """
     drawn = [case for name in LINE_COLOURS for case in bounds.cases if case.name == name and case.result is not None]
@@ -439,7 +445,7 @@ def _draw(axes: Axes, bounds: Bounds, cases: list[Case], axis: int) -> None:
 
 
 def _loop(result: Result | BuildingResult | None) -> tuple[Array, Array]:
-    """Displacement across the bearing [m] and force on its top [N], of a building their mean and sum, shape (k, 3)."""
+    """Displacement across the bearing [m] and force on its top [N], both shape (k, 3); of a building mean and sum."""
     assert result is not None  # cases without rows are not drawn
     if isinstance(result, BuildingResult):
         u = np.mean([bearing.history.displacement for bearing in result.bearings], axis=0)
@@ -448,9 +454,9 @@ def _loop(result: Result | BuildingResult | None) -> tuple[Array, Array]:
 
 
 def _label(bounds: Bounds, case: Case) -> str:
-    """Name of the case and its factors; one number if all surfaces have the same."""
-    parts = []
-    for named, factors in bounds.lambdas.items():
+    """Name of the case and its factors for a legend; equal factors of surfaces are one number."""
+    lambdas = []
+    for name, factors in bounds.lambdas.items():
         values = list(dict.fromkeys(f"{value:.3g}" for value in factors[case.name]))
-        parts.append(f"{named.replace('_', ' ')} × {' / '.join(values)}")
-    return f"{case.name}: {', '.join(parts)}" + (", run failed" if case.failure else "")
+        lambdas.append(f"{name.replace('_', ' ')} × {' / '.join(values)}")
+    return f"{case.name}: {', '.join(lambdas)}" + (", run failed" if case.failure else "")

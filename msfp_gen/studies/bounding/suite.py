@@ -1,4 +1,7 @@
-"""Bounds under a suite of ground motions: means, worst values and envelopes, as tables and as a figure."""
+"""Bounds under a suite of ground motions: means, worst values and envelopes over the records.
+
+A scene for each record comes in; `bound` runs each; statistics go out, as tables, CSV and a figure.
+"""
 
 from __future__ import annotations
 
@@ -26,18 +29,18 @@ if TYPE_CHECKING:
 
     from msfp_gen.buildings.file import AnyScene
 
-# Quantities of the figure; those that a run does not have are left out.
+# Quantities of the figure, where the runs have them.
 DRAWN = ("peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "capacity_left")
 WORST: dict[str, Callable[..., Any]] = {"most": np.max, "least": np.min}
 
 
 @dataclass(frozen=True)
 class Statistic:
-    """A quantity over the records of a suite.
+    """Statistics of a quantity over the records of a suite.
 
-    name: column of `catalogue`. part: name of the bearing, storey, floor or surface that it is of; "" for the whole.
-    extreme: whether the largest value is the worst, or the least. means, worst: by case, in SI. governs: the case with
-    the worst mean. record: that with the worst value of all.
+    name: column of `catalogue`. part: name of its bearing, storey, floor or surface; "" for the bearing or building as
+    a whole. extreme: whether the largest or the least value is the worst. means, worst: by case [SI]. governs: case
+    with the worst mean. record: record with the worst value of all.
     """
 
     name: str
@@ -51,9 +54,9 @@ class Statistic:
 
     @property
     def envelope(self) -> tuple[float, float]:
-        """Mean and worst value of the case that governs each."""
-        pick = WORST[self.extreme]
-        return float(pick(self.means)), float(pick(self.worst))
+        """The worst mean and the worst value over the cases [SI]."""
+        worst_of = WORST[self.extreme]
+        return float(worst_of(self.means)), float(worst_of(self.worst))
 
 
 @dataclass(frozen=True)
@@ -61,14 +64,15 @@ class SuiteBounds:
     """Result of `bound_suite`.
 
     Attributes:
-        table: the table of factors.
+        name: of the scene, for the figure.
+        table: of factors.
         records: names of the motions.
         sources: column -> quantity, with the name of its bearing, storey, floor or surface.
-        values: column -> value, shape (records, cases) [SI]; NaN where a run has none.
-        failures: record and case -> message of a run that failed.
+        values: column -> values, shape (records, cases) [SI]; NaN where a run has none.
+        failures: (record, case) -> message of a run that failed.
         undefined: column -> why runs that reached their end have no value.
-        exceeded: record and case -> the verdict of a run that exceeded limits of the device.
-        stopped: record and case -> time at which a run met the stop condition of the scene [s].
+        exceeded: (record, case) -> verdict of a run that exceeded limits of the device.
+        stopped: (record, case) -> time at which a run met the stop condition of the scene [s].
     """
 
     name: str
@@ -83,31 +87,31 @@ class SuiteBounds:
 
     @cached_property
     def statistics(self) -> tuple[Statistic, ...]:
-        """Of each quantity that every run has, and of which the largest or the least value governs."""
+        """The statistics of every quantity with a mean, as of `has_mean`."""
         return tuple(self._statistic(name, values) for name, values in self.values.items() if self.has_mean(name))
 
     def has_mean(self, name: str) -> bool:
-        """Whether a mean of a column is one of whole runs."""
+        """Whether a column has a mean: a value of it governs, every run has one, and no run met the stop condition."""
         known = not self.stopped and not np.isnan(self.values[name]).any()
         return bool(self.sources[name].quantity.governs) and known
 
     def _statistic(self, name: str, values: Array) -> Statistic:
         quantity, _, part = self.sources[name]
-        pick = WORST[quantity.governs]
-        means, worst = values.mean(axis=0), pick(values, axis=0)
-        case = CASES[int(np.flatnonzero(means == pick(means))[0])]
-        record = self.records[int(np.argwhere(values == pick(values))[0][0])]
+        worst_of = WORST[quantity.governs]
+        means, worst = values.mean(axis=0), worst_of(values, axis=0)
+        case = CASES[int(np.flatnonzero(means == worst_of(means))[0])]
+        record = self.records[int(np.argwhere(values == worst_of(values))[0][0])]
         numbers = tuple(means.tolist()), tuple(worst.tolist())
         return Statistic(name, part, quantity.unit, quantity.governs, *numbers, case, record)
 
     @property
     def left_out(self) -> dict[str, str]:
-        """Column -> why it has no statistic, of quantities that would have one."""
+        """Column -> why it has no mean, for the columns of which a value governs."""
         runs, reasons = len(self.records) * len(CASES), dict(self.undefined)
-        for early, what in ((self.stopped, "met the stop condition of the scene"), (self.failures, "failed")):
-            if early:
-                why = f"{len(early)} of {runs} runs {what}, so that a mean would be biased"
-                reasons |= {name: why for name, source in self.sources.items() if source.quantity.governs}
+        for incomplete, what in ((self.stopped, "met the stop condition of the scene"), (self.failures, "failed")):
+            if incomplete:
+                reason = f"{len(incomplete)} of {runs} runs {what}, so that a mean would be biased"
+                reasons |= {name: reason for name, source in self.sources.items() if source.quantity.governs}
         return reasons
 
     def as_dict(self) -> dict[str, Any]:
@@ -126,11 +130,12 @@ class SuiteBounds:
 def bound_suite(
     scenes: Mapping[str, AnyScene], table: FactorTable, *, name: str = "", progress: Progress | None = None
 ) -> SuiteBounds:
-    """The bounds of a scene under each motion of a suite; only their quantities are kept.
+    """Run the cases of `bound` under each motion of a suite, and keep the quantities of the runs.
 
     A run that fails is part of the result. Raises InputError as `bound`; RunError: no run reached its end.
 
-    scenes: name of the record -> the scene with its motion. name: of the whole, in the figure. progress: as of `bound`.
+    scenes: name of the record -> the scene with this motion. name: of the scene, for the figure. progress: as of
+    `bound`.
     """
     first = next(iter(scenes.values()))
     sources = _quantities(first)
@@ -140,9 +145,9 @@ def bound_suite(
     exceeded: dict[tuple[str, str], str] = {}
     stopped: dict[tuple[str, str], float] = {}
     for row, (record, scene) in enumerate(scenes.items()):
-        part = None if progress is None else _share(progress, row, len(scenes))
+        own_progress = None if progress is None else _progress_of(progress, row, len(scenes))
         try:
-            cases = bound(scene, table, progress=part).cases
+            cases = bound(scene, table, progress=own_progress).cases
         except RunError as error:
             failures |= {(record, case): str(error) for case in CASES}
             continue
@@ -157,8 +162,8 @@ def bound_suite(
             for key, source in sources.items():
                 if (value := case.value(source)) is not None:
                     values[key][row, column] = value
-                elif why := source.reason(case.characterisation):
-                    undefined[key] = why
+                elif reason := source.reason(case.characterisation):
+                    undefined[key] = reason
     if len(failures) == len(scenes) * len(CASES):
         raise RunError(
             f"no run of the suite reached its end; the first: {next(iter(failures.values()))}", status="bound"
@@ -166,13 +171,13 @@ def bound_suite(
     return SuiteBounds(name, table, tuple(scenes), sources, values, failures, undefined, exceeded, stopped)
 
 
-def _share(progress: Progress, row: int, count: int) -> Progress:
-    """Progress of one record of a suite."""
+def _progress_of(progress: Progress, row: int, count: int) -> Progress:
+    """The progress of one record, by its index, as progress of a suite of `count` records."""
     return lambda done, whole: progress(row + done / whole, count)
 
 
 def _quantities(scene: AnyScene) -> dict[str, Source]:
-    """The quantities of which one value governs, with the names of the parts that they are of."""
+    """Column -> quantity of which a value governs, with the name of its part of the bearing or building."""
     names: dict[str, list[str]] = {}
     if not isinstance(scene, Scene):
         names = {
@@ -189,7 +194,9 @@ def _quantities(scene: AnyScene) -> dict[str, Source]:
 
 
 def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
-    """Tables of the statistics of the whole, of what has none, and of runs that failed; parts: `write_statistics`."""
+    """Tables of statistics of the bearing or building as a whole, of quantities without a mean, and of runs that
+    exceeded limits, met the stop condition, or failed. `write_statistics` writes the statistics of parts too.
+    """
     rows = []
     for statistic in bounds.statistics:
         if not statistic.part:
@@ -213,12 +220,13 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
 
 
 def _label(name: str, part: str) -> str:
+    """A column in words; its number is replaced by the name of the part."""
     stem = name.rpartition("_")[0] if part else name
     return stem.replace("_", " ") + (f" of {part}" if part else "")
 
 
 def write_statistics(bounds: SuiteBounds, path: str | Path) -> Path:
-    """Write the statistics as CSV in SI units: one row for each quantity, of the whole and of parts by their names.
+    """Write the statistics as CSV in SI units: one row for each quantity, with the name of its part.
 
     Raises InputError for a path that does not end in .csv or cannot be written.
     """
@@ -238,7 +246,10 @@ def write_statistics(bounds: SuiteBounds, path: str | Path) -> Path:
 
 
 def write_records(bounds: SuiteBounds, path: str | Path) -> Path:
-    """Write the quantities of every run as CSV in SI units: one row for each record and case; else as above."""
+    """Write the quantities of every run as CSV in SI units, one row for each record and case.
+
+    Raises InputError for a path that does not end in .csv or cannot be written.
+    """
     count = len(CASES)
     runs = [(record, case) for record in bounds.records for case in CASES]
     columns: dict[tuple[str, str], list[Any]] = {
@@ -255,9 +266,9 @@ def write_records(bounds: SuiteBounds, path: str | Path) -> Path:
 
 
 def plot_suite_bounds(bounds: SuiteBounds, path: str | Path | None = None) -> Figure:
-    """The main quantities of every record over the cases, each record in a colour of its own, with their means.
+    """The quantities DRAWN over the cases: each record in a colour of its own, and the means over the records.
 
-    Runs without a value are left out. Raises InputError for a path that cannot be written.
+    Runs without a value are not drawn. Raises InputError for a path that cannot be written.
     """
     drawn = [name for name in DRAWN if name in bounds.values and not np.isnan(bounds.values[name]).all()]
     colours = distinct(len(bounds.records))
