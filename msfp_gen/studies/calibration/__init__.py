@@ -1,4 +1,7 @@
-"""Calibration: numbers of a scene for which its runs give the forces that tests have measured (docs/fit.md)."""
+"""Calibration: values of a scene for which its runs give the measured forces of laboratory tests (docs/fit.md).
+
+Measurements -> residuals of runs -> least squares (`fitting`) -> intervals -> `Fit`.
+"""
 
 from msfp_gen.studies.calibration.fit_result import Estimate, Fit
 from msfp_gen.studies.calibration.fitting import fit

@@ -1,4 +1,7 @@
-"""`Fit`: values, intervals and correlations of a calibration, and what it cannot identify; as text and as tables."""
+"""`Fit`: values, intervals and correlations of a calibration, and the parameters that its tests do not identify.
+
+Last step of a calibration: text, tables, files and figures of a fit.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,7 @@ if TYPE_CHECKING:
     from msfp_gen.figures.style import Scale
     from msfp_gen.scene.scene import Scene
 
-SHOWN, LINES = 4, 10  # parameters, and lines, in the text of a fit
+SHOWN, LINES = 4, 10  # parameters and lines in the text of a fit, at most
 
 
 @dataclass(frozen=True)
@@ -48,10 +51,11 @@ class Estimate:
         name: path of the parameter, tied paths separated by `=`; `offset of FILE` for an offset of force.
         unit: SI unit.
         value, start: after and before the fit [unit].
-        deviation: standard deviation from the noise of the tests [unit]; infinite where the value is not determined.
-        low, high: 95 % interval [unit], which contains the error of the runs.
-        run_error: of the value, from the error of the runs [unit]; infinite where it could not be measured.
-        bounds: between which the value was sought [unit]; infinite for an offset.
+        deviation: standard deviation of the value from the noise of the tests [unit]; infinite where the tests do not
+            determine the value.
+        low, high: 95 % interval, with the error of the runs [unit].
+        run_error: error of the value from the error of the runs [unit]; infinite where it could not be measured.
+        bounds: of the search [unit]; infinite for an offset.
         at_bound: whether the value is at one of its bounds, where the interval has no meaning.
     """
 
@@ -77,15 +81,16 @@ class Fit:
     """Result of `fit`.
 
     Attributes:
-        scene: the scene with the fitted values; its motion is that of the given scene.
+        scene: the given scene with the fitted values.
         estimates: of the parameters, then of the offsets.
-        correlation: of the estimates, ndarray, shape (k, k), [-]; NaN where one is not determined.
-        condition: largest over least singular value of the Jacobian of unit columns.
+        correlation: of the estimates, ndarray, shape (k, k), [-]; NaN in the rows of an estimate that is not
+            determined.
+        condition: largest over least singular value of the Jacobian with columns of unit length [-].
         tests: measured and fitted forces.
         unidentified: one line for each set of parameters that the tests do not tell apart, or do not see.
-        notes: lines on what limits the intervals.
+        notes: one line for each thing that limits the intervals.
         evaluations: number of times that all tests were run.
-        rtol: relative tolerance of the last runs.
+        rtol: relative tolerance of the last runs [-].
     """
 
     scene: Scene
@@ -122,14 +127,19 @@ class Fit:
         return "\n".join([*lines, *extra])
 
     def as_dict(self) -> dict[str, Any]:
-        """All numbers in SI as plain values; None where a value is not determined."""
+        """All numbers in SI as plain values, ready for JSON; None where a number is infinite or NaN."""
         return {
-            "estimates": [{name: _plain(value) for name, value in vars(e).items()} for e in self.estimates],
+            "estimates": [{name: _plain(number) for name, number in vars(value).items()} for value in self.estimates],
             "correlation": [[_plain(float(value)) for value in row] for row in self.correlation],
             "condition": _plain(self.condition),
             "tests": [
-                {"name": t.measured.name, "deviation": t.deviation, "share": t.share, "weight": t.measured.weight}
-                for t in self.tests
+                {
+                    "name": test.measured.name,
+                    "deviation": test.deviation,
+                    "share": test.share,
+                    "weight": test.measured.weight,
+                }
+                for test in self.tests
             ],
             "unidentified": list(self.unidentified),
             "notes": list(self.notes),
@@ -157,7 +167,7 @@ class Fit:
         return [folder / name for name in (*texts, "residuals.csv", "fit.png")]
 
     def _columns(self) -> dict[tuple[str, str], list[Any]]:
-        """(name, unit) -> values at all times of all tests."""
+        """(name, unit) of each column of `residuals.csv` -> values at all times of all tests."""
         rows: dict[tuple[str, str], Any] = {
             ("time", "s"): [test.measured.time for test in self.tests],
             ("displacement", "m"): [test.measured.displacement for test in self.tests],
@@ -170,13 +180,14 @@ class Fit:
 
 
 def _plain(value: Any) -> Any:
+    """A value for JSON: tuples as lists, None for a number that is not finite."""
     if isinstance(value, tuple):
         return [_plain(item) for item in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def fit_tables(fit: Fit) -> list[Table]:
-    """Estimates, correlations, tests, and what limits the fit."""
+    """Tables of estimates, correlations and tests, and of what limits the fit."""
     tables = [estimate_table(fit)]
     if len(fit.estimates) > 1:
         tables.append(correlation_table(fit))
@@ -186,18 +197,18 @@ def fit_tables(fit: Fit) -> list[Table]:
 
 
 def estimate_table(fit: Fit) -> Table:
-    """Values, intervals and starts."""
+    """Values, intervals and starts of the estimates."""
     rows = []
-    for e in fit.estimates:
-        spread = f"{e.low:.4g} to {e.high:.4g}" if np.isfinite(e.high) else "not determined"
-        value = f"{e.value:.5g}" + (" (bound)" if e.at_bound else "")
-        rows.append((e.name, value, spread, f"{e.start:.4g}", e.unit or "-"))
+    for estimate in fit.estimates:
+        interval = f"{estimate.low:.4g} to {estimate.high:.4g}" if np.isfinite(estimate.high) else "not determined"
+        value = f"{estimate.value:.5g}" + (" (bound)" if estimate.at_bound else "")
+        rows.append((estimate.name, value, interval, f"{estimate.start:.4g}", estimate.unit or "-"))
     title = f"fitted in {fit.evaluations} evaluations, the last with rtol {fit.rtol:g}"
     return Table(title, ("parameter", "value", "95 % interval", "start", "unit"), rows)
 
 
 def correlation_table(fit: Fit) -> Table:
-    """Correlations of the estimates, in their order."""
+    """Correlations of the estimates, in the order of the estimates."""
     numbers = [str(i) for i in range(1, len(fit.estimates) + 1)]
     rows = [
         (estimate.name, *(f"{value:+.3f}" if np.isfinite(value) else "-" for value in line))
@@ -207,20 +218,20 @@ def correlation_table(fit: Fit) -> Table:
 
 
 def residual_table(fit: Fit) -> Table:
-    """Deviation of every test."""
-    shares = [
+    """Deviation and number of rows of every test."""
+    rows = [
         (test.measured.name, f"{test.deviation:.4g}", f"{100 * test.share:.2f}", str(len(test.force)))
         for test in fit.tests
     ]
-    return Table("residuals", ("test", "deviation [N]", "over the peak [%]", "rows"), shares)
+    return Table("residuals", ("test", "deviation [N]", "over the peak [%]", "rows"), rows)
 
 
-ACROSS = 4  # tests beside each other
-DRAWN = 24  # tests; more would make a picture that few programs open
+ACROSS = 4  # tests beside each other in a figure
+DRAWN = 24  # tests in a figure, at most: few programs open a larger picture
 
 
 def plot_fit(tests: Sequence[FittedTest], title: str = "fit", path: str | Path | None = None) -> Figure:
-    """Measured and fitted loops, below each the residual over time, for the first 24 tests. path: as of `page`."""
+    """Measured and fitted loops of the first 24 tests, each above its residual over time. path: as of `page`."""
     drawn, across = tests[:DRAWN], min(len(tests), ACROSS)
     rows = -(-len(drawn) // across)
     with page(max(4.2 * across, 6.0), 6.4 * rows, path, "fit") as figure:
@@ -250,10 +261,10 @@ def _draw_test(test: FittedTest, loop: Axes, below: Axes) -> None:
 
 
 def plot_residuals(tests: Sequence[FittedTest], path: str | Path | None = None) -> Figure:
-    """Residuals of all tests: over the displacement, over the force, and against those of a normal distribution.
+    """Residuals of all tests over the displacement and over the force, and their quantiles over normal quantiles.
 
-    Where the model is right they are a band about zero without a pattern, and the last curve follows its line. Raises
-    InputError for a path that cannot be written.
+    For a model without error the residuals are a band about zero without a pattern, and the quantiles follow the line.
+    Raises InputError for a path that cannot be written.
     """
     from scipy.stats import norm
 

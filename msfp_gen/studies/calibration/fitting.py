@@ -1,6 +1,7 @@
-"""`fit`: calibrates numbers of a scene to laboratory tests by nonlinear least squares with exact Jacobians.
+"""`fit`: calibrates values of a scene to laboratory tests by nonlinear least squares with exact Jacobians.
 
-Runs become tighter until their error is small against the intervals.
+A scene, measurements and paths of parameters come in; residuals are minimised; a `Fit` goes out. After the search the
+tolerance of the runs falls until their error is small against the intervals.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
 
-CORRELATED = 0.5  # correlation of consecutive residuals from which the fit has a note
-GIVES_WAY = 0.02  # of the largest displacement: movement of the rig from which the fit has a note
+CORRELATED = 0.5  # correlation of consecutive residuals above which the fit has a note
+GIVES_WAY = 0.02  # movement of the rig over the largest displacement, above which the fit has a note
 
 
 def fit(
@@ -46,26 +47,27 @@ def fit(
     progress: Progress | None = None,
     max_evaluations: int = 100,
 ) -> Fit:
-    """Values of some parameters for which runs of a scene give the forces that tests have measured.
+    """Fit parameters of a scene so that its runs give the measured forces of tests.
 
-    Every evaluation runs every test once, with the derivatives of its force (docs/gradients.md), in threads on all
-    cores. `scipy.optimize.least_squares` makes the next step within the bounds (method "trf"). Runs begin with the
-    tolerance of the scene, and go on with smaller ones until their error is small against the intervals.
+    An evaluation runs every test once, with the derivatives of its force (docs/gradients.md), in threads on all cores.
+    `scipy.optimize.least_squares` makes the next step within the bounds (method "trf"). The first runs have the
+    tolerance of the scene; the tolerance then falls until the error of the runs is small against the intervals.
 
     Args:
-        scene: the bearing on its test rig, with the values at the start. The displacement of each test replaces its
+        scene: the bearing on its test rig, with the values at the start. The displacement of each test replaces the
             motion.
         tests: files with the columns time, displacement and force, or measurements.
         parameters: paths, such as `bearing.surfaces[*].friction`; `A=B` gives the same value to both.
         bounds: path -> least and largest value [SI]; by default a tenth and ten times the value in the scene.
-        offset: fit an offset of the force of each test too.
+        offset: whether to fit an offset of the force of each test too.
         columns: names of the columns: see `read_measurement`.
-        progress: called during the runs, in their threads, with the number of the evaluation, its share that is done
-            and the last deviation [N]. An exception in it ends the fit.
-        max_evaluations: at most so many evaluations in the search; tighter runs at its end are not counted.
+        progress: called during the runs, in their threads, with the number of the evaluation, the share of it that is
+            done, and the last deviation [N]. An exception in it ends the fit.
+        max_evaluations: largest number of evaluations in the search; the runs with smaller tolerances after the search
+            are not counted.
 
-    Raises InputError: a file, a parameter or a bound is wrong, or runs of the scene have no gradients: one line.
-    RunError: a run of the scene as it was given fails, or the fit has not converged after `max_evaluations`.
+    Raises InputError of one line: a file, a parameter or a bound is wrong, or runs of the scene have no gradients.
+    RunError: a run of the given scene fails, or the fit has not converged after `max_evaluations`.
     """
     return end_fit(scene, start_fit(scene, tests, parameters, bounds, offset, columns, progress), max_evaluations)
 
@@ -73,11 +75,11 @@ def fit(
 def end_fit(scene: Scene, residuals: Residuals, max_evaluations: int = 100) -> Fit:
     """The fit of the residuals of `start_fit`; arguments and RunError as of `fit`."""
     start, low, high = search_range(residuals)
-    return _outcome(scene, residuals, solve(residuals, start, low, high, max_evaluations), (low, high))
+    return _fit_of(scene, residuals, solve(residuals, start, low, high, max_evaluations), (low, high))
 
 
 def search_range(residuals: Residuals) -> tuple[Array, Array, Array]:
-    """Start, least and largest value of every unknown over its scale, shape (k,) [-]; offsets of force are free."""
+    """Start, least and largest value of every unknown over its scale, shape (k,) [-]; offsets have no bounds."""
     values = np.array([(u.start, u.low, u.high) for u in residuals.unknowns]).reshape(-1, 3)
     offsets = np.tile([0.0, -np.inf, np.inf], (residuals.offsets, 1))
     start, low, high = np.vstack([values, offsets]).T / residuals.scale
@@ -93,11 +95,11 @@ def start_fit(
     columns: Mapping[str, str] | None = None,
     progress: Progress | None = None,
 ) -> Residuals:
-    """The residuals of a fit, all input checked; arguments and InputError as of `fit`."""
+    """Check the input of a fit; returns its residuals. Arguments and InputError as of `fit`."""
     if isinstance(tests, str | Path | Measurement) or not tests:
         raise InputError(f"tests = {tests!r}: give a list of files or measurements")
-    read = [test if isinstance(test, Measurement) else read_measurement(test, columns) for test in tests]
-    sampled = tuple(test.sampled() for test in _distinct(read))
+    measured = [test if isinstance(test, Measurement) else read_measurement(test, columns) for test in tests]
+    sampled = tuple(test.sampled() for test in _with_distinct_names(measured))
     scenes = scenes_of(scene, sampled)
     unknowns = unknowns_of(scenes[0], parameters, bounds)
     if any(test.axial_load is not None for test in sampled):
@@ -107,8 +109,8 @@ def start_fit(
     return Residuals(sampled, scenes, unknowns, offset, progress)
 
 
-def _distinct(tests: Sequence[Measurement]) -> list[Measurement]:
-    """The tests, with a number behind a name that an earlier one has, such as a file of another folder."""
+def _with_distinct_names(tests: Sequence[Measurement]) -> list[Measurement]:
+    """The tests; a number follows a name that an earlier test has, such as a file of another folder."""
     names = [test.name for test in tests]
     counts = [names[: i + 1].count(name) for i, name in enumerate(names)]
     return [
@@ -117,8 +119,8 @@ def _distinct(tests: Sequence[Measurement]) -> list[Measurement]:
     ]
 
 
-def _outcome(scene: Scene, residuals: Residuals, solution: Solution, limits: tuple[Array, Array]) -> Fit:
-    """The fit of a solution, with its intervals. limits: bounds of the unknowns over their scales."""
+def _fit_of(scene: Scene, residuals: Residuals, solution: Solution, limits: tuple[Array, Array]) -> Fit:
+    """The fit of a solution. limits: bounds of the unknowns over their scales, each shape (k,)."""
     scale, size = residuals.scale, len(residuals.unknowns)
     units = [u.unit for u in residuals.unknowns] + ["N"] * residuals.offsets
     starts = [u.start for u in residuals.unknowns] + [0.0] * residuals.offsets
@@ -146,7 +148,7 @@ def _outcome(scene: Scene, residuals: Residuals, solution: Solution, limits: tup
 
 
 def _notes(estimates: Sequence[Estimate], tests: Sequence[FittedTest], stiffness: float) -> list[str]:
-    """What limits the values of the fit. stiffness: of the rig [N/m]."""
+    """Lines on values at a bound and on tests in which the rig moves. stiffness: of the rig [N/m]."""
     bound = "is at its bound; its interval, and those of the others, have no meaning"
     lines = [f"{estimate.name} {bound}" for estimate in estimates if estimate.at_bound]
     for test in tests:
@@ -160,7 +162,7 @@ def _notes(estimates: Sequence[Estimate], tests: Sequence[FittedTest], stiffness
 
 
 def _error_notes(residuals: Residuals, solution: Solution) -> list[str]:
-    """What makes the intervals wider than noise without correlation would."""
+    """Lines on what makes the intervals wider than uncorrelated noise: errors of the runs, correlated residuals."""
     lines, spread = [], solution.spread
     if not np.isfinite(solution.run_error).all():
         lines.append(
@@ -168,8 +170,8 @@ def _error_notes(residuals: Residuals, solution: Solution) -> list[str]:
             f"rtol = {residuals.rtol:g} fail ({solution.failure})"
         )
     else:
-        some = np.isfinite(spread.half) & ~solution.at_bound
-        wider = solution.run_error[some] / np.maximum(spread.half[some], np.finfo(float).tiny)
+        determined = np.isfinite(spread.half) & ~solution.at_bound
+        wider = solution.run_error[determined] / np.maximum(spread.half[determined], np.finfo(float).tiny)
         if (wider > SMALL).any():
             failure = solution.failure
             remedy = f"runs with a smaller one fail ({failure})" if failure else "give a smaller solver.rtol"
@@ -179,32 +181,33 @@ def _error_notes(residuals: Residuals, solution: Solution) -> list[str]:
             )
     if (correlation := lag_one(residuals.split(solution.end.residuals))) > CORRELATED:
         independent = np.sqrt(solution.end.variance) * np.linalg.norm(solution.known.factors, axis=1)
-        some = np.isfinite(spread.deviation) & (independent > 0)
-        wider = (spread.deviation[some] / independent[some]).max(initial=1.0)
+        determined = np.isfinite(spread.deviation) & (independent > 0)
+        factor = (spread.deviation[determined] / independent[determined]).max(initial=1.0)
         lines.append(
             f"residuals are correlated ({correlation:.2f}): intervals are wider for it, by a factor of up to "
-            f"{wider:.2g}, and contain no other error of a model that misses part of the tests"
+            f"{factor:.2g}, and contain no other error of a model that misses part of the tests"
         )
     return lines
 
 
-TOLERANCE = 1e-5  # relative change of cost and values at which the search ends; errors of runs hide smaller ones
-WITHIN = 0.1  # standard errors: the next step that ends the search (Bates and Watts 1981)
-FIRST, NEXT = 100.0, 10.0  # by which the tolerance is divided, first and later; see docs/fit.md
-LEAST = 1e-7  # tolerance beyond which a second division does not go
-REST = 0.5  # of what the last division changed: the most that is left, in random fits
-SMALL = 0.1  # of the half width of an interval: error of the runs that is small
+TOLERANCE = 1e-5  # relative change of cost and values that ends the search; errors of runs hide smaller changes
+WITHIN = 0.1  # length of a step in standard errors below which the search ends (Bates and Watts 1981)
+FIRST, NEXT = 100.0, 10.0  # divisors of the tolerance, first and later; see docs/fit.md
+LEAST = 1e-7  # least tolerance after the first division
+REST = 0.5  # error left after a division, over the change by the division: at most, in random fits
+SMALL = 0.1  # error of the runs that is small, over half the width of the interval
 STEPS = 3  # at one tolerance, with the Jacobian of the search
-AT_BOUND = 1e-3  # of the range: distance from a bound within which a value is at it
+AT_BOUND = 1e-3  # distance from a bound within which a value is at the bound, over the range
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Unknowns x over their scales, shape (k,) [-], and what is known of their errors.
+    """Values of the unknowns and their errors.
 
-    end: the evaluation at x. known: what its Jacobian tells. spread: under the noise of the tests. at_bound: which are
-    at a bound. rtol: of the runs. run_error: of x, from the errors of the runs, shape (k,); infinite where it could not
-    be measured. failure: why runs at the next tolerance failed.
+    x: unknowns over their scales, shape (k,) [-]. end: the evaluation at x. known: the combinations of unknowns that
+    its Jacobian determines. spread: deviations of x under the noise of the tests. at_bound: whether each unknown is at
+    a bound, shape (k,). rtol: of the runs. run_error: error of x from the errors of the runs, shape (k,) [-]; infinite
+    where it could not be measured. failure: why runs at the next tolerance failed.
     """
 
     x: Array
@@ -218,19 +221,20 @@ class Solution:
 
     @property
     def half(self) -> Array:
-        """Half widths of the intervals, which contain the error of the runs, shape (k,) [-]."""
+        """Half the widths of the intervals, with the error of the runs, shape (k,) [-]."""
         return self.spread.half + self.run_error
 
 
 def solve(residuals: Residuals, start: Array, low: Array, high: Array, most: int) -> Solution:
     """The unknowns between two bounds for which the sum of squares is least.
 
-    After the search runs are tighter: by a factor of 100, then by 10 until their error is below a tenth of the half
-    width of each interval, or the next tolerance would be below 1e-7. The Jacobian stays that of the search (simplified
-    Newton steps): the change of the values under it measures the error of the runs, of which half is taken as left.
+    After the search the tolerance of the runs is divided by 100, and then by 10 until the error of the runs is below a
+    tenth of half the width of each interval, or the next tolerance would be below 1e-7. Steps at these tolerances use
+    the Jacobian of the search (simplified Newton steps). The change of the values by a division measures the error of
+    the runs, of which half is taken as left.
 
-    most: evaluations of the search. Raises RunError as `least_squares`; where tighter runs fail, the solution is that
-    of the runs before.
+    most: number of evaluations of the search. Raises RunError as `least_squares`; where runs at a smaller tolerance
+    fail, the solution before is returned.
     """
     x, end = least_squares(residuals, start, low, high, most)
     solution, factor = _solution(residuals, x, end, low, high), FIRST
@@ -243,7 +247,7 @@ def solve(residuals: Residuals, start: Array, low: Array, high: Array, most: int
         remainder = REST * np.abs(first.step(free) - solution.end.step(free))
         x, end = _steps(residuals, solution.x, first, free, low, high)
         solution = _solution(residuals, x, end, low, high)
-        # A step that is left is an error too, which smaller tolerances do not mend: derivatives contain ringing.
+        # The remaining step is an error too, which no smaller tolerance removes: derivatives contain ringing.
         solution = replace(solution, run_error=remainder + np.abs(end.step(~solution.at_bound)))
         small = (remainder <= SMALL * solution.spread.half) | solution.at_bound
         if small.all() or solution.rtol / NEXT < LEAST * (1 - 1e-9):
@@ -253,7 +257,10 @@ def solve(residuals: Residuals, start: Array, low: Array, high: Array, most: int
 def _steps(
     residuals: Residuals, x: Array, at: Evaluation, free: NDArray[np.bool_], low: Array, high: Array
 ) -> tuple[Array, Evaluation]:
-    """Steps with the Jacobian of an evaluation at x until one is within the errors, or the next is no better."""
+    """Step from an evaluation at x, with its Jacobian, until a step is within the errors or reduces nothing.
+
+    free: the unknowns that move. Returns the last x, and the evaluation there.
+    """
     for _ in range(STEPS):
         step = np.clip(x + at.step(free), low, high) - x
         if at.step_in_errors(step) < WITHIN:
@@ -266,12 +273,12 @@ def _steps(
 
 
 def _solution(residuals: Residuals, x: Array, end: Evaluation, low: Array, high: Array) -> Solution:
-    """What an evaluation tells of the errors of x, where that of its runs is not measured."""
+    """The solution at x from its evaluation `end`; the error of the runs is infinite, since it is not measured yet."""
     known = identified(end.jacobian, residuals.names)
     noises = noise_of(residuals.split(end.residuals), residuals.split(known.basis))
     near = np.isfinite(low) & (np.minimum(x - low, high - x) < AT_BOUND * (high - low))
-    beyond = x + end.step(~near)  # where the minimum is
-    at_bound, unmeasured = near | (beyond < low) | (beyond > high), np.full(len(x), np.inf)
+    minimum = x + end.step(~near)  # of the linearised sum of squares, without bounds
+    at_bound, unmeasured = near | (minimum < low) | (minimum > high), np.full(len(x), np.inf)
     return Solution(x, end, known, spread_of(known, noises), at_bound, residuals.rtol, unmeasured)
 
 
@@ -283,22 +290,22 @@ def least_squares(residuals: Residuals, start: Array, low: Array, high: Array, m
     """The unknowns between two bounds, shape (k,) [-], for which the sum of squares is least, and the evaluation there.
 
     The search also ends where the next step is shorter than a tenth of the standard errors: the noise of the tests
-    makes smaller ones meaningless, and the error of runs, which varies irregularly with the values, hides them.
+    makes smaller steps meaningless, and the error of runs, which varies irregularly with the values, hides them.
 
-    most: number of evaluations. Raises RunError where the start fails, the search has not ended by then, or it ends
-    beside values whose runs fail.
+    most: number of evaluations. Raises RunError where the start fails, the search has not ended after `most`
+    evaluations, or it ends beside values whose runs fail.
     """
     from scipy.optimize import least_squares as search
 
-    best, at_best, begun = start, residuals.at(start), False
+    best, at_best, started = start, residuals.at(start), False
     failure: RunError | InputError | None = None  # of the last trial
     if at_best.failure is not None:
         raise at_best.failure
 
     def values(x: Array) -> Array:
         nonlocal best, at_best, failure
-        # After a failed run the next step is short because the search was thrown back, not because it ends.
-        if begun and failure is None and not np.array_equal(x, best) and at_best.step_in_errors(x - best) < WITHIN:
+        # After a failed run the next step is short because the search shortens it, not because it converges.
+        if started and failure is None and not np.array_equal(x, best) and at_best.step_in_errors(x - best) < WITHIN:
             raise _WithinError
         at = residuals.at(x)
         failure = at.failure
@@ -307,16 +314,16 @@ def least_squares(residuals: Residuals, start: Array, low: Array, high: Array, m
         return at.residuals
 
     def jacobian(x: Array) -> Array:
-        nonlocal begun
-        begun = True  # before, x differs from the start where that is nearly at a bound
+        nonlocal started
+        started = True  # before the first Jacobian, the search moves a start that is nearly at a bound
         return (at_best if np.array_equal(x, best) else residuals.at(x)).jacobian
 
     limits = {"ftol": TOLERANCE, "xtol": TOLERANCE, "gtol": None, "max_nfev": most}
     try:
-        ended = search(values, start, jacobian, bounds=(low, high), **limits)
+        found = search(values, start, jacobian, bounds=(low, high), **limits)
     except _WithinError:
         return best, at_best
-    if ended.status == 0:
+    if found.status == 0:
         raise RunError(
             f"fit: not converged after {most} evaluations; give tighter bounds, fewer parameters, or more evaluations",
             status="fit",

@@ -1,9 +1,9 @@
-"""Intervals of fitted values from the Jacobian and the noise of the tests, and what the tests cannot identify.
+"""Intervals of fitted values from the Jacobian and the residuals, and the parameters that the tests do not identify.
 
-The residuals of a fit show the noise: of each test a variance and an autocorrelation. Consecutive residuals are
-correlated where the noise was filtered, or where the model misses part of a test. Each test is a stationary process of
-its own (an autoregression), so that the covariance of the fitted values is that of ordinary least squares with
-correlated errors (Seber and Wild 1989, chapter 6), the autoregressive form of a heteroscedasticity and autocorrelation
+The residuals of each test show its noise: a variance and an autocorrelation. Consecutive residuals are correlated where
+the noise was filtered, or where the model misses part of a test. The noise of a test is taken as a stationary
+autoregression. The covariance of the fitted values is then the covariance of ordinary least squares with correlated
+errors (Seber and Wild 1989, chapter 6), in the autoregressive form of a heteroscedasticity and autocorrelation
 consistent covariance (den Haan and Levin 1997).
 """
 
@@ -17,21 +17,21 @@ from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
 
-CORRECTIONS = 3  # of the sums over lags for what the fit took out of the residuals; the third changes them by percents
-LEAST_SHARE = 1e-3  # of a measured sum of squares, below which no correction lowers it
+CORRECTIONS = 3  # of the sums over lags for the bias of residuals; the third changes the sums by percents
+LEAST_SHARE = 1e-3  # least corrected sum of squares, over the measured sum
 CONFIDENCE = 0.95
-UNSEEN = 1e-6  # of the largest column: a parameter that changes the forces less is not seen
-SINGULAR = 1e4  # condition of the Jacobian from which a combination is not identified; runs err by about 1e-4
-PART = 0.3  # of a singular vector: a smaller component takes no part in the combination
-ALIKE = 0.98  # correlation from which two parameters are named
-UNCERTAIN = 0.5  # half width of an interval over the value from which the value is named
+UNSEEN = 1e-6  # length of a column of the Jacobian, over the largest, below which its parameter is not seen
+SINGULAR = 1e4  # condition above which a combination of parameters is not identified; runs err by about 1e-4
+PART = 0.3  # component of a singular vector, over the largest, above which its parameter is in the combination
+ALIKE = 0.98  # correlation above which two parameters are named
+UNCERTAIN = 0.5  # half the width of an interval over the value, above which the value is named
 
 
 class Noise(NamedTuple):
     """Stationary noise of one test.
 
-    variance: of a weighted residual. correlation: at lags of 0, 1, ... rows, shape (T,) [-]. freedom: effective number
-    of rows, less the share of the unknowns that this test determines.
+    variance: of a weighted residual [-]. correlation: at lags of 0, 1, ... rows, shape (T,) [-]. freedom: effective
+    number of rows, reduced by the unknowns that this test determines.
     """
 
     variance: float
@@ -48,10 +48,11 @@ class Noise(NamedTuple):
 def noise_of(residuals: Sequence[Array], bases: Sequence[Array]) -> list[Noise]:
     """The noise of each test, without the bias of residuals.
 
-    A fit takes out of the noise what its unknowns can follow: sums over lags of the residuals M e are too small. Their
-    expectation under the noise as estimated before, from M Omega M, corrects them, in three turns.
+    The unknowns of a fit follow part of the noise, so that sums over lags of the residuals M e are too small. Their
+    expectation under the noise of the previous estimate, from M Omega M, corrects the sums, three times.
 
-    residuals: of each test, shape (T,). bases: rows of each test of an orthonormal basis of the Jacobian, shape (T, m).
+    residuals: of each test, shape (T,) [-]. bases: rows of each test in an orthonormal basis of the Jacobian, shape
+    (T, m).
     """
     orders = [max(int(min(10 * np.log10(len(r)), len(r) // 4)), 1) for r in residuals]
     measured = [_lag_sums(r[:, None], r[:, None])[: order + 1] for r, order in zip(residuals, orders, strict=True)]
@@ -60,17 +61,17 @@ def noise_of(residuals: Sequence[Array], bases: Sequence[Array]) -> list[Noise]:
         spread = [noise.covariance_times(basis) for noise, basis in zip(noises, bases, strict=True)]
         inner = np.sum([basis.T @ columns for basis, columns in zip(bases, spread, strict=True)], axis=0)
         noises = [
-            _noise(sums + _taken(basis, columns, inner)[: len(sums)], basis, LEAST_SHARE * sums[0])
+            _noise(sums + _bias(basis, columns, inner)[: len(sums)], basis, LEAST_SHARE * sums[0])
             for sums, basis, columns in zip(measured, bases, spread, strict=True)
         ]
     return noises
 
 
 def _noise(sums: Array, basis: Array, least: float = 0.0) -> Noise:
-    """The noise of a test with these sums over lags; basis: its rows of the orthonormal basis of the Jacobian.
+    """The noise of a test. sums: over lags. basis: its rows in the orthonormal basis of the Jacobian.
 
-    Of an autoregression of order one, and of the order by the information criterion of Akaike, it is the one with the
-    fewer effective rows: the first is stable with few rows, the second sees slow parts below white noise.
+    Two autoregressions are compared: of order one, which is stable with few rows, and of the order by the information
+    criterion of Akaike, which sees slow parts below white noise. The noise has the fewer effective rows of the two.
     """
     rows = len(basis)
     if sums[0] <= 0:
@@ -82,16 +83,16 @@ def _noise(sums: Array, basis: Array, least: float = 0.0) -> Noise:
     repeats, correlation = max(
         ((float(taper @ candidate), candidate) for candidate in (first, _by_akaike(lags, rows))), key=lambda p: p[0]
     )
-    own = 1 - float(np.sum(basis**2)) / rows
-    return Noise(max(float(sums[0]), least) / rows, correlation, max(rows / max(repeats, 1.0) * own, 1.0))
+    free_share = 1 - float(np.sum(basis**2)) / rows
+    return Noise(max(float(sums[0]), least) / rows, correlation, max(rows / max(repeats, 1.0) * free_share, 1.0))
 
 
 def _by_akaike(lags: Array, rows: int) -> Array:
-    """Autocorrelation at all lags, shape (rows,), of the autoregression that these first lags give (Yule-Walker).
+    """Autocorrelation at all lags, shape (rows,) [-], of the autoregression with these first lags (Yule-Walker).
 
-    Its order has the least criterion of Akaike among those that are stationary (Levinson and Durbin).
+    Of the stationary orders (Levinson and Durbin), its order has the least criterion of Akaike.
     """
-    weights = chosen = np.zeros(0)
+    weights = best = np.zeros(0)
     remainder, least = 1.0, 0.0
     for order in range(1, len(lags)):
         reflection = (lags[order] - weights @ lags[order - 1 : 0 : -1]) / remainder
@@ -101,17 +102,20 @@ def _by_akaike(lags: Array, rows: int) -> Array:
         remainder *= 1 - reflection**2
         criterion = rows * np.log(remainder) + 2 * order
         if criterion < least:
-            least, chosen = criterion, weights
-    order = len(chosen)
+            least, best = criterion, weights
+    order = len(best)
     correlation = np.zeros(rows)
     correlation[: order + 1] = lags[: order + 1]
     for lag in range(order + 1, rows if order else 0):
-        correlation[lag] = chosen @ correlation[lag - order : lag][::-1]
+        correlation[lag] = best @ correlation[lag - order : lag][::-1]
     return correlation
 
 
-def _taken(basis: Array, spread: Array, inner: Array) -> Array:
-    """Sums over lags of Omega - M Omega M in one test, with M = 1 - Q Q', spread = Omega Q and inner = Q' Omega Q."""
+def _bias(basis: Array, spread: Array, inner: Array) -> Array:
+    """Bias of the sums over lags of one test, shape (T,): sums of Omega - M Omega M with M = 1 - Q Q'.
+
+    basis: Q. spread: Omega Q. inner: Q' Omega Q.
+    """
     return _lag_sums(basis, spread) + _lag_sums(spread, basis) - _lag_sums(basis @ inner, basis)
 
 
@@ -123,11 +127,11 @@ def _lag_sums(first: Array, second: Array) -> Array:
 
 
 class Identified(NamedTuple):
-    """What a Jacobian J tells of the unknowns.
+    """The combinations of unknowns that a Jacobian determines.
 
-    basis: orthonormal, of the combinations that change the residuals, shape (N, m) [-]. factors: of the
-    pseudo-inverse, which is `factors @ basis.T`, shape (k, m) [-]. undetermined: unknowns without an interval, (k,).
-    condition: of the Jacobian with columns of unit length. lines: on what is not identified.
+    basis: orthonormal changes of the residuals by these combinations, shape (N, m) [-]. factors: shape (k, m) [-]; the
+    pseudo-inverse of the Jacobian is `factors @ basis.T`. undetermined: whether each unknown has no interval, (k,).
+    condition: of the Jacobian with columns of unit length. lines: on unknowns that are not identified.
     """
 
     basis: Array
@@ -138,10 +142,10 @@ class Identified(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """Of the unknowns over their scales, infinite where they are not determined.
+    """Errors of the unknowns over their scales.
 
-    deviation: standard deviations, shape (k,) [-]. half: half widths of the intervals, shape (k,) [-]. correlation:
-    shape (k, k) [-], NaN in the rows of a value that is not determined.
+    deviation: standard deviations, shape (k,) [-]. half: half the widths of the intervals, shape (k,) [-]. correlation:
+    shape (k, k) [-]. Where an unknown is not determined, the first two are infinite, and its correlations NaN.
     """
 
     deviation: Array
@@ -150,10 +154,10 @@ class Spread(NamedTuple):
 
 
 def identified(jacobian: Array, names: Sequence[str]) -> Identified:
-    """What the Jacobian, shape (N, k), tells of the unknowns, by its singular values with columns of unit length.
+    """The combinations of unknowns that a Jacobian, shape (N, k), determines, by its singular values.
 
-    Combinations with a singular value below 1e-4 of the largest are taken as not determined: their parameters are named
-    and have no interval.
+    The columns are scaled to unit length. Combinations with a singular value below 1e-4 of the largest are not
+    determined: `lines` names their parameters, which have no interval. names: of the unknowns.
     """
     lengths = np.linalg.norm(jacobian, axis=0)
     seen = lengths > UNSEEN * lengths.max()
@@ -167,41 +171,41 @@ def identified(jacobian: Array, names: Sequence[str]) -> Identified:
     factors = np.zeros((len(seen), int(clear.sum())))
     factors[known] = vectors[clear].T / singular[clear] / lengths[known][:, None]
     for vector in vectors[~clear]:
-        part = known[np.abs(vector) > PART * np.abs(vector).max()]
-        group = ", ".join(names[i] for i in part)
+        members = known[np.abs(vector) > PART * np.abs(vector).max()]
+        group = ", ".join(names[i] for i in members)
         lines.append(f"cannot be told apart by these tests: {group}; fit fewer, or add another amplitude")
-        undetermined[part] = True
+        undetermined[members] = True
     return Identified(basis[:, clear], factors, undetermined, condition, tuple(lines))
 
 
 def spread_of(known: Identified, noises: Sequence[Noise]) -> Spread:
-    """Spread of least-squares values under the noise of each test; rows of the basis are those of the tests in turn.
+    """Errors of least-squares values under the noise of each test; the basis has the rows of the tests in turn.
 
-    With P the pseudo-inverse the covariance is the sum of P_t Omega_t P_t' over tests t, and the degrees of freedom of
-    Student's t are those of Welch and Satterthwaite for such a sum.
+    With the pseudo-inverse P the covariance is the sum of P_t Omega_t P_t' over tests t. The degrees of freedom of
+    Student's t for such a sum follow Welch and Satterthwaite.
     """
     from scipy.stats import t
 
     bases = np.split(known.basis, np.cumsum([len(noise.correlation) for noise in noises])[:-1])
     inner = [basis.T @ noise.covariance_times(basis) for basis, noise in zip(bases, noises, strict=True)]
-    parts = np.array([known.factors @ matrix @ known.factors.T for matrix in inner])
-    covariance, variances = parts.sum(axis=0), np.einsum("tkk->tk", parts)
+    of_tests = np.array([known.factors @ matrix @ known.factors.T for matrix in inner])
+    covariance, variances = of_tests.sum(axis=0), np.einsum("tkk->tk", of_tests)
     covariance[known.undetermined, known.undetermined] = np.inf
     deviation = np.sqrt(np.diag(covariance))
     freedom = np.ones(len(deviation))
-    some = np.isfinite(deviation) & (deviation > 0)
-    squares = variances[:, some] ** 2 / np.array([[noise.freedom] for noise in noises])
-    freedom[some] = np.maximum(deviation[some] ** 4 / squares.sum(axis=0), 1.0)
-    known_ones = np.where(some, deviation, np.nan)
+    determined = np.isfinite(deviation) & (deviation > 0)
+    squares = variances[:, determined] ** 2 / np.array([[noise.freedom] for noise in noises])
+    freedom[determined] = np.maximum(deviation[determined] ** 4 / squares.sum(axis=0), 1.0)
+    divisor = np.where(determined, deviation, np.nan)
     with np.errstate(invalid="ignore"):
-        correlation = covariance / np.outer(known_ones, known_ones)
+        correlation = covariance / np.outer(divisor, divisor)
     return Spread(deviation, t.ppf(0.5 + CONFIDENCE / 2, freedom) * deviation, correlation)
 
 
 def weak(names: Sequence[str], values: Array, half: Array, correlation: Array) -> list[str]:
-    """Lines that name values of wide intervals, and sets of which each is nearly one with another.
+    """Lines that name strongly correlated parameters, and parameters with a wide interval.
 
-    half: half width of the interval of each value.
+    values, half: of each parameter, and half the width of its interval, shape (k,) [its unit]. correlation: (k, k).
     """
     from scipy.sparse.csgraph import connected_components
 
@@ -218,6 +222,6 @@ def weak(names: Sequence[str], values: Array, half: Array, correlation: Array) -
 
 
 def lag_one(residuals: Sequence[Array]) -> float:
-    """Correlation of consecutive residuals, over all tests; 0 where there are none."""
-    whole = sum(float(r @ r) for r in residuals)
-    return sum(float(r[1:] @ r[:-1]) for r in residuals) / whole if whole else 0.0
+    """Correlation of consecutive residuals over all tests [-]; 0 where all residuals are 0."""
+    squares = sum(float(r @ r) for r in residuals)
+    return sum(float(r[1:] @ r[:-1]) for r in residuals) / squares if squares else 0.0

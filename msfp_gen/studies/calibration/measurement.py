@@ -1,4 +1,7 @@
-"""`Measurement`: time, displacement and force of a laboratory test, from a text file; `FittedTest`: beside its run."""
+"""First step of a calibration: `Measurement`, the time, displacement and force of a laboratory test, from a text file.
+
+`FittedTest` has a measurement beside the force of the fitted run.
+"""
 
 from __future__ import annotations
 
@@ -17,27 +20,27 @@ from msfp_gen.motions.checks import finite
 from msfp_gen.motions.records.text import Lines, read_lines
 
 UNITS = {"time": "s", "displacement": "m", "force": "N"}
-LEAST_ROWS, MOST_ROWS = 20, 2000  # rows of a test; more are averaged in blocks
+LEAST_ROWS, MOST_ROWS = 20, 2000  # rows of a test; more rows are averaged in blocks
 _AT_CENTRE = 0.05  # permitted first displacement, as a share of the largest
 _CELL = re.compile(r"\s*(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))?\s*")
 
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """One test: a displacement that was prescribed along E1, and the force that was measured.
+    """One test: a prescribed displacement along E1, and the measured force.
 
     Attributes:
         name: in messages, tables and figures.
         time: ndarray, shape (k,), [s], increasing.
         displacement: across the bearing, base less top, ndarray, shape (k,), [m].
-        force: of the bearing on the support of the top plate, ndarray, shape (k,), [N]. It has the sign of the
-            displacement in a loop; where both have the opposite sign the fit is the same.
-        axial_load: [N]; None: that of the scene.
-        weight: of the residuals of this test; 2 counts as a standard deviation half as large.
+        force: of the bearing on the support of the top plate, ndarray, shape (k,), [N]. In a loop it has the sign of
+            the displacement. A change of the sign of both changes no fitted value.
+        axial_load: [N]; None: of the scene.
+        weight: of the residuals of this test [-]; 2 counts as a standard deviation half as large.
 
     Raises:
-        InputError: fewer than 20 rows, numbers that are not finite, times that do not increase, a test that begins away
-            from its centre, or whose loop gives energy.
+        InputError: fewer than 20 rows, numbers that are not finite, times that do not increase, a displacement that
+            does not begin at the centre, or a loop that gives energy.
     """
 
     name: str
@@ -82,7 +85,7 @@ class Measurement:
             )
 
     def sampled(self) -> Measurement:
-        """The test with at most 2000 rows: means of blocks of rows, of which the first row stays as it is."""
+        """The test with at most 2000 rows: the first row, then means of blocks of rows."""
         size = -(-(len(self.time) - 1) // (MOST_ROWS - 1))
         if size == 1:
             return self
@@ -101,9 +104,9 @@ def read_measurement(
 ) -> Measurement:
     """Read a test from a text table with a header; columns are separated by commas, semicolons or tabs.
 
-    path: of the file; lines that begin with # are comments. columns: the name in the header of `time`, `displacement`
-    and `force`, with a unit in brackets where the header has none, such as {"force": "Load cell 1 [kN]"}; without an
-    entry the name is the same. axial_load, weight: of `Measurement`.
+    path: of the file; lines that begin with # are comments. columns: `time`, `displacement`, `force` -> name in the
+    header, with a unit in brackets where the header has none, such as {"force": "Load cell 1 [kN]"}; without an entry
+    the name is the same. axial_load, weight: as of `Measurement`.
 
     Raises InputError of one line that names file, row and column.
     """
@@ -114,26 +117,29 @@ def read_measurement(
     head = next((i for i, text in enumerate(lines.lines) if text.strip() and not text.lstrip().startswith("#")), None)
     if head is None:
         lines.fail(0, "no header; begin with: time [s], displacement [mm], force [kN]")
-    mark = next((mark for mark in ("\t", ";") if mark in lines[head]), ",")
-    header = [text.strip().strip('"') for text in lines[head].split(mark)]
+    separator = next((mark for mark in ("\t", ";") if mark in lines[head]), ",")
+    header = [text.strip().strip('"') for text in lines[head].split(separator)]
     places = {name: _place(lines, head, header, name, (columns or {}).get(name, name)) for name in UNITS}
-    rows = _rows(lines, head, mark, header, places)
+    rows = _rows(lines, head, separator, header, places)
     values = dict(zip(UNITS, np.array(rows).T * [[factor] for _, factor in places.values()], strict=True))
     return Measurement(Path(path).name, **values, axial_load=axial_load, weight=weight)
 
 
 def _rows(
-    lines: Lines, head: int, mark: str, header: list[str], places: Mapping[str, tuple[int, float]]
+    lines: Lines, head: int, separator: str, header: list[str], places: Mapping[str, tuple[int, float]]
 ) -> list[list[float]]:
-    """The numbers of time, displacement and force of every row."""
-    rows, last, end = [], [], head
+    """Time, displacement and force of every row [units of the file]. head: index of the header line.
+
+    places: name -> (index of the column, factor of its unit to SI). Raises InputError.
+    """
+    rows, last_cells, end = [], [], head
     for index in range(head + 1, len(lines)):
         if not lines[index].strip() or lines[index].lstrip().startswith("#"):
             continue
-        cells = lines[index].split(mark)
+        cells = lines[index].split(separator)
         if len(cells) != len(header):
             lines.fail(index, f"{len(cells)} columns, the header names {len(header)}")
-        last.append(cells[-1])
+        last_cells.append(cells[-1])
         end = index
         rows.append([_number(lines, index, header[at], cells[at]) for at, _ in places.values()])
         if len(rows) > 1 and rows[-1][0] <= rows[-2][0]:
@@ -141,7 +147,7 @@ def _rows(
             lines.fail(index, f"column {header[at]!r}: {cells[at].strip()} does not increase; sort or cut the data")
     if not rows:
         lines.fail(head, "no rows of numbers after the header")
-    lines.check_end(end, last)
+    lines.check_end(end, last_cells)
     return rows
 
 
@@ -153,7 +159,7 @@ def _number(lines: Lines, index: int, column: str, text: str) -> float:
 
 
 def _place(lines: Lines, head: int, header: list[str], name: str, column: str) -> tuple[int, float]:
-    """Index of a column and the factor of its unit to SI."""
+    """(index of a column in the header, factor of its unit to SI). Raises InputError."""
     wanted, unit = _split(column)
     places = [i for i, text in enumerate(header) if text.lower() == column.strip().lower()]
     places = places or [i for i, text in enumerate(header) if _split(text)[0].lower() == wanted.lower()]
@@ -184,7 +190,7 @@ class FittedTest:
     """A test beside the run of the fitted bearing.
 
     Attributes:
-        measured: the test at the times that were compared (at most 2000).
+        measured: the test, sampled to at most 2000 rows.
         force: of the run, with the offset of the test, ndarray, shape (T,), [N].
     """
 
@@ -203,5 +209,5 @@ class FittedTest:
 
     @property
     def share(self) -> float:
-        """The same over the largest measured force."""
+        """`deviation` over the largest measured force [-]."""
         return self.deviation / float(np.abs(self.measured.force).max())

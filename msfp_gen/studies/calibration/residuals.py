@@ -1,4 +1,8 @@
-"""Unknowns of a fit, and its residuals with their exact Jacobian: one run for each test, at the same time."""
+"""The unknowns of a fit, and the residuals of its tests with their exact Jacobian.
+
+Values of the unknowns come in; a pool runs the scene of every test; weighted differences of force and their derivatives
+go out.
+"""
 
 from __future__ import annotations
 
@@ -31,10 +35,10 @@ _OF_THE_TEST = {
     "initial_state": "a test starts at the centre of the bearing",
 }
 Progress = Callable[[int, float, float], None]  # number of the evaluation, its share done, last deviation [N]
-Run = tuple[Array, Array] | RunError | InputError  # force and its derivatives at the times of a test, or why not
-TRAVEL = 1.5  # largest displacement of a test over the sum of all capacities
-RATIOS = 1e-3, 5.0  # least and largest value of the largest force of a test over the axial load
-FAILED = 10.0  # residual of a run that failed, over the largest force: worse than any run, so that the step is refused
+Run = tuple[Array, Array] | RunError | InputError  # force and its derivatives at the times of a test, or the error
+TRAVEL = 1.5  # peak displacement of a test over the sum of all capacities, at most
+RATIOS = 1e-3, 5.0  # peak force of a test over the axial load, at least and at most
+FAILED = 10.0  # residual of a failed run, over the largest force: worse than any run, so that the step is refused
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,8 @@ class Unknown:
 
     Attributes:
         name: path of the parameter; of tied parameters all paths, separated by `=`.
-        members: parameters that have this value.
-        low, high: bounds [unit].
+        members: the parameters that have this value.
+        low, high: bounds [`unit`].
     """
 
     name: str
@@ -54,34 +58,35 @@ class Unknown:
 
     @property
     def start(self) -> float:
-        """Value at the start of the fit [unit]."""
+        """Value at the start of the fit [`unit`]."""
         return self.members[0].value
 
     @property
     def unit(self) -> str:
-        """SI unit."""
+        """SI unit of the value."""
         return self.members[0].unit
 
 
 def unknowns_of(
     scene: Scene, paths: Sequence[str], bounds: Mapping[str, tuple[float, float]] | None = None
 ) -> tuple[Unknown, ...]:
-    """The unknowns at some paths; `A=B` is one unknown for both. bounds: path, as given or of one parameter -> (low,
-    high). Raises InputError that names the path.
+    """The unknowns at some paths; `A=B` is one unknown for both. Raises InputError that names the path.
+
+    bounds: path, as given or of one parameter -> (low, high) [SI].
     """
     if isinstance(paths, str) or not paths:
         raise InputError(f"parameters = {paths!r}: give a list of paths, such as ['bearing.surfaces[*].friction']")
-    rest, unknowns = {_whole(path): limits for path, limits in (bounds or {}).items()}, []
-    for path in map(_whole, paths):
-        parts = path.split("=")
-        members = [parameters_of(scene, [part], "parameters") for part in parts]
-        groups = [(p,) for p in members[0]] if len(parts) == 1 else [tuple(p for m in members for p in m)]
-        limits = rest.pop(path, None)
+    unused, unknowns = {_full_path(path): limits for path, limits in (bounds or {}).items()}, []
+    for path in map(_full_path, paths):
+        tied = path.split("=")
+        members = [parameters_of(scene, [part], "parameters") for part in tied]
+        groups = [(p,) for p in members[0]] if len(tied) == 1 else [tuple(p for m in members for p in m)]
+        limits = unused.pop(path, None)
         for group in groups:
             name = "=".join(parameter.path for parameter in group)
-            unknowns.append(_unknown(name, group, rest.pop(name, limits)))
-    if rest:
-        raise InputError(f"bounds: {next(iter(rest))!r} is no parameter of this fit; give one of its paths")
+            unknowns.append(_unknown(name, group, unused.pop(name, limits)))
+    if unused:
+        raise InputError(f"bounds: {next(iter(unused))!r} is no parameter of this fit; give one of its paths")
     fitted = [member for unknown in unknowns for member in unknown.members]
     names = [member.path for member in fitted]
     for member in fitted:
@@ -93,13 +98,13 @@ def unknowns_of(
 
 
 def changed_scene(scene: Scene, unknowns: Sequence[Unknown], values: Array) -> Scene:
-    """The scene with these values of the unknowns. Raises InputError where a field does not accept its value."""
+    """The scene with values of the unknowns, shape (k,). Raises InputError where a field does not accept its value."""
     pairs = zip(unknowns, values, strict=True)
     return changed_parameters(scene, {p: float(value) for unknown, value in pairs for p in unknown.members})
 
 
-def _whole(path: str) -> str:
-    """A path, or tied paths, with `friction[0]` written as `bearing.friction[0]`."""
+def _full_path(path: str) -> str:
+    """A path, or tied paths, with `bearing.` before a path without a table, such as `friction[0]`."""
     parts = [part.strip() for part in str(path).split("=")]
     return "=".join(part if "." in part else f"bearing.{part}" for part in parts)
 
@@ -128,8 +133,9 @@ def _unknown(name: str, members: tuple[Parameter, ...], limits: tuple[float, flo
 class Evaluation:
     """Runs of all tests at one set of values.
 
-    residuals: weighted, over the largest force of all tests, shape (N,). jacobian: with respect to the unknowns over
-    their scales, shape (N, k). forces: of the runs, one array for each test [N]. failure: of a run that failed.
+    residuals: weighted, over the largest force of all tests, shape (N,) [-]. jacobian: with respect to the unknowns
+    over their scales, shape (N, k) [-]. forces: of each run at the times of its test, shape (T,) [N]. failure: of a run
+    that failed.
     """
 
     residuals: Array
@@ -144,28 +150,29 @@ class Evaluation:
 
     @property
     def variance(self) -> float:
-        """Of the residuals: their squares over rows less unknowns."""
+        """Variance of the residuals: sum of squares over rows less unknowns [-]."""
         rows, unknowns = self.jacobian.shape
         return self.square / float(max(rows - unknowns, 1))
 
     def step(self, free: NDArray[np.bool_]) -> Array:
-        """Step to the minimum of the linearised sum of squares, of the unknowns that are free, shape (k,) [-]."""
+        """Step of the free unknowns to the minimum of the linearised sum of squares, shape (k,) [-]."""
         step = np.zeros(len(free))
         step[free] = np.linalg.lstsq(self.jacobian[:, free], -self.residuals, rcond=1 / SINGULAR)[0]
         return step
 
     def step_in_errors(self, step: Array) -> float:
-        """Length of a step of the unknowns in their standard errors (Bates and Watts 1981); step: shape (k,)."""
+        """Length of a step of the unknowns, shape (k,), in standard errors (Bates and Watts 1981) [-]."""
         length, error = float(np.linalg.norm(self.jacobian @ step)), float(np.sqrt(len(step) * self.variance))
         return length / error if error else np.inf if length else 0.0
 
 
 @dataclass(eq=False)
 class Residuals:
-    """Residuals as a function of the unknowns, over their scales.
+    """Residuals of the tests as a function of the unknowns over their scales.
 
-    tests: sampled. scenes: one for each test. scale: of each unknown. with_offset: whether each test has an offset of
-    its force, as a last unknown. largest: force by which residuals are divided [N].
+    tests: sampled. scenes: one for each test. unknowns: without offsets. with_offset: whether the offset of force of
+    each test is a further unknown. progress: as of `fit`. count: number of evaluations. deviation: of the last
+    evaluation [N].
     """
 
     tests: tuple[Measurement, ...]
@@ -179,27 +186,27 @@ class Residuals:
 
     @property
     def names(self) -> list[str]:
-        """Of the unknowns."""
+        """Names of the unknowns, then of the offsets."""
         return [u.name for u in self.unknowns] + [f"offset of {test.name}" for test in self.tests[: self.offsets]]
 
     @property
     def rtol(self) -> float:
-        """Relative tolerance of the runs."""
+        """Relative tolerance of the runs [-]."""
         return self.scenes[0].solver.rtol
 
     def tighten(self, factor: float) -> None:
-        """Make later runs at tolerances divided by this factor."""
+        """Divide the tolerances of later runs by a factor."""
         self.scenes = tuple(replace(scene, solver=scene.solver.tightened(factor)) for scene in self.scenes)
         self._last = None
 
     @property
     def largest(self) -> float:
-        """Largest force of all tests [N]."""
+        """Largest force of all tests, by which residuals are divided [N]."""
         return float(max(np.abs(test.force).max() for test in self.tests))
 
     @property
     def scale(self) -> Array:
-        """Unit of each unknown, shape (k,): its value at the start, the largest force for offsets [N]."""
+        """Scale of each unknown, shape (k,) [its unit]: its value at the start, or the largest force for an offset."""
         values = [abs(u.start) or max(abs(u.low), abs(u.high)) for u in self.unknowns]
         return np.array(values + [self.largest] * self.offsets)
 
@@ -209,14 +216,14 @@ class Residuals:
         return len(self.tests) if self.with_offset else 0
 
     def at(self, x: Array) -> Evaluation:
-        """The evaluation at x; the last one is kept, since an optimiser asks for its Jacobian afterwards."""
+        """The evaluation at x. The last evaluation is cached, since an optimiser asks for its Jacobian afterwards."""
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, self.evaluate(x)
         return self._last[1]
 
     def evaluate(self, x: Array, jacobian: Array | None = None) -> Evaluation:
-        """The evaluation at x; with a Jacobian, shape (N, k), it has this one and its runs no derivatives."""
+        """Run all tests at x. A given Jacobian, shape (N, k), is taken as it is, and the runs have no derivatives."""
         self.count += 1
         evaluation = self._evaluate(x * self.scale, jacobian)
         if evaluation.failure is None:
@@ -224,7 +231,7 @@ class Residuals:
         return evaluation
 
     def split(self, rows: Array) -> list[Array]:
-        """Rows of all tests, shape (N, ...) [unit of `rows`], as those of each."""
+        """Rows of all tests, shape (N, ...), split into the rows of each test, shape (T, ...) [unit of `rows`]."""
         return np.split(rows, np.cumsum([len(test.time) for test in self.tests])[:-1])
 
     def _evaluate(self, values: Array, jacobian: Array | None) -> Evaluation:
@@ -242,11 +249,11 @@ class Residuals:
             residuals.append(test.weight * (force - test.force) / self.largest)
             if jacobian is None:
                 blocks.append(test.weight * np.column_stack([slopes, shift]) * self.scale / self.largest)
-        whole = np.concatenate(blocks) if jacobian is None else jacobian
-        return Evaluation(np.concatenate(residuals), whole, tuple(forces))
+        jacobian = np.concatenate(blocks) if jacobian is None else jacobian
+        return Evaluation(np.concatenate(residuals), jacobian, tuple(forces))
 
     def _runs(self, values: Array, slopes: bool) -> list[Run]:
-        """Runs of all tests at these values, at the same time; the error of a run that fails."""
+        """Run all tests at the same time; a run that fails gives its error. slopes: whether with derivatives."""
         for spec in dict.fromkeys(scene.spec for scene in self.scenes):
             build_model(spec.layout, spec.effects, gradients=slopes)
         shared = SharedProgress(len(self.tests), self._report)
@@ -269,7 +276,7 @@ class Residuals:
     def _run(
         self, index: int, values: Array, slopes: bool, show: Callable[[float, float], None]
     ) -> tuple[Array, Array]:
-        """Force of a run at the times of a test, shape (T,), and its derivatives, shape (T, k), or (T, 0) without."""
+        """Force of a run at the times of its test, shape (T,) [N], and its derivatives, shape (T, k) or (T, 0)."""
         test, scene = self.tests[index], changed_scene(self.scenes[index], self.unknowns, values)
         paths = [member.path for unknown in self.unknowns for member in unknown.members]
         result = simulate(scene, gradients=paths if slopes else (), gradient_errors=False, progress=show)
@@ -283,9 +290,9 @@ class Residuals:
 
 
 def scenes_of(scene: Scene, tests: Sequence[Measurement]) -> tuple[Scene, ...]:
-    """The scene under the displacement of each test, along E1 from the centre, with the effects fixed.
+    """The scene of each test: the displacement of the test along E1 from the centre, and fixed effects.
 
-    Raises InputError for a scene that is no test rig, or whose runs have no gradients.
+    Raises InputError for a scene without a test rig, or whose runs have no gradients.
     """
     if scene.top.kind != "rig":
         raise InputError(f'top.kind = "{scene.top.kind}": a test holds the top plate; give a scene with a rig')
@@ -293,7 +300,7 @@ def scenes_of(scene: Scene, tests: Sequence[Measurement]) -> tuple[Scene, ...]:
 
 
 def _check_size(scene: Scene, test: Measurement) -> None:
-    """Raises InputError for a test that cannot be of this bearing, as with a wrong unit."""
+    """Raise InputError where displacement or force of a test do not fit the bearing, as with a wrong unit."""
     travel = sum(surface.capacity for surface in scene.bearing.surfaces)
     largest, ratio = np.abs(test.displacement).max(), np.abs(test.force).max() / scene.top.axial_load  # type: ignore[attr-defined]
     if largest > TRAVEL * travel:
@@ -322,7 +329,7 @@ def _test_scene(scene: Scene, test: Measurement) -> Scene:
         top=scene.top if test.axial_load is None else replace(scene.top, axial_load=test.axial_load),  # type: ignore[call-arg]
     )
     _check_size(test_scene, test)
-    test_scene = replace(test_scene, effects=test_scene.modelled)  # so that no evaluation selects others
+    test_scene = replace(test_scene, effects=test_scene.modelled)  # so that all evaluations have the same effects
     for surface in undamped_surfaces(test_scene, test_scene.modelled)[:1]:
         raise InputError(UNDAMPED.format(surface=surface))
     return test_scene
