@@ -1,9 +1,9 @@
-"""Run a scene to a requested error: find the cheapest tolerance that meets it on this scene.
+"""Run a scene to a requested error: search the cheapest tolerance that meets the error on this scene.
 
-The error is estimated by a reference run of a method of another family, at a tenth of the tolerance, with steps of at
-most half the mean step, and where affordable with steps that resolve the ringing of stuck sliders. SAFETY covers
-the error of the reference run; docs/accuracy.md compares such estimates with true errors. Half of the error is left to
-effect selection, half to the method.
+A reference run by a method of other stages, at a tenth of the tolerance, estimates the error. Its steps are at most
+half the mean step, and resolve the ringing of stuck sliders where affordable. SAFETY covers the error of the reference
+run; docs/accuracy.md compares such estimates with true errors. Half of the requested error is for effect selection,
+half for the method.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ if TYPE_CHECKING:
 
 AFTER_IMPACTS = ", and after impacts,"
 CANDIDATE_TOLERANCES = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21))  # 1e-2, 3e-3, 1e-3 ... 1e-10
-REFERENCE_OFFSET = 2  # places from a candidate tolerance to that of its reference run: a factor of ten
-STEPS_PER_PERIOD = 40  # of a ringing slider, in a reference run that resolves it
+REFERENCE_OFFSET = 2  # candidates from a tolerance to the tolerance of its reference run: a factor of ten
+STEPS_PER_PERIOD = 40  # of a reference run that resolves a ringing slider
 MOST_STEPS = 200_000  # of a reference run that resolves ringing: some seconds; beyond, ringing is stated as left out
 SAFETY = 1.5  # factor on the difference from the reference run, which has an error of its own
-DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays and needs no words
-STAGNATION_RATIO = 0.7  # an estimate that falls by less than this over two candidates is not due to the tolerance
-BUDGET = 120.0  # [s] of wall time for the whole search
+DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays, so that it is not mentioned
+STAGNATION_RATIO = 0.7  # ratio of errors over two candidates above which the tolerance is not their cause
+BUDGET = 120.0  # wall time of the whole search [s]
 METHOD: Final = "implicit"
 REFERENCE_METHOD = "esdirk4"  # other stages, order and dense output
 
 
 def effects_for(scene: Scene, error: float) -> tuple[Effects | Auto, str]:
-    """Effects for a run with relative error `error` [-], and the reasons in words.
+    """Effects for a run with relative error `error` [-], and the reasons as text.
 
-    Effects that the scene gives are kept. With effect selection (`Auto`), they are selected for half of `error`; the
-    other half is left to the method.
+    Given effects are kept. With effect selection (`Auto`) they are selected for half of `error`; the other half is for
+    the method.
     """
     effects = scene.effects
     if isinstance(effects, Effects):
@@ -58,7 +58,7 @@ def effects_for(scene: Scene, error: float) -> tuple[Effects | Auto, str]:
 def with_all_effects(scene: Scene) -> Scene:
     """The scene with every effect that it has parameters for and does not fix, to measure the error of a selection.
 
-    A scene whose effects are given (`Effects`) is returned unchanged.
+    A scene with given effects (`Effects`) is returned unchanged.
     """
     if isinstance(scene.effects, Effects):
         return scene
@@ -72,10 +72,11 @@ class Attempt:
     Attributes:
         method: name of the method.
         rtol: relative tolerance [-].
-        seconds: wall time [s]; measured for the chosen run, else its iterations times the time per iteration of that.
-        newton: Newton iterations.
-        estimate: largest of the RMS and peak errors of force and sliding, relative to peaks [-], times a factor of
-            safety; None if the run was compared with no other, or failed.
+        seconds: wall time [s]; measured for the chosen run, else iterations times the time per iteration of the chosen
+            run.
+        newton: number of Newton iterations.
+        estimate: largest of the RMS and peak errors of force and sliding, relative to peaks, times a factor of safety
+            [-]; None if the run has no reference run, or failed.
         errors: differences from the reference run; None as for `estimate`.
         status: how the run ended.
     """
@@ -97,11 +98,12 @@ class Within:
         result: the run.
         target: requested relative error [-].
         chosen: tolerance, cost and estimated error of `result`.
-        next_step: the same for the next tighter candidate tolerance; None if there is none or no time was left.
-        attempts: all candidate tolerances that were tried, loosest first.
-        seconds: wall time of the search and the run [s].
-        left_out: what the estimate does not include, in words; empty if nothing.
-        reasons: why these settings were chosen, in words.
+        next_step: tolerance, cost and estimated error at the next tighter candidate; None if there is none, or no time
+            was left.
+        attempts: at all candidate tolerances that were tried, loosest first.
+        seconds: wall time of search and run [s].
+        left_out: errors that the estimate does not include, as text; "" if none.
+        reasons: for the settings, as text.
         explained: whether `tables` lists attempts and reasons.
     """
 
@@ -124,7 +126,7 @@ class Within:
     def tables(self) -> list[Table]:
         """Tables for the console; with attempts and reasons if an explanation was requested."""
         chosen, step, errors = self.chosen, self.next_step, self.chosen.errors
-        parts = (
+        components = (
             "not estimated"
             if errors is None
             else (
@@ -132,12 +134,12 @@ class Within:
                 f"{share(errors.sliding_rms)} RMS, {share(errors.sliding_peak)} at its peak"
             )
         )
-        following = "not run in the time given"
+        tighter = "not run in the time given"
         if step is not None:
             smaller = (step.estimate or 1.0) < (chosen.estimate or 0.0)
             error = f"about {share(step.estimate)}" if smaller else "no smaller estimate"
-            following = f"rtol {step.rtol:g}: {error} in {_seconds(step.seconds)}"
-        estimate = f"{share(chosen.estimate)}: {parts}"
+            tighter = f"rtol {step.rtol:g}: {error} in {_seconds(step.seconds)}"
+        estimate = f"{share(chosen.estimate)}: {components}"
         known = self.estimate is not None
         cost = (
             f"{_seconds(chosen.seconds)}, {chosen.newton} Newton iterations; with the search {_seconds(self.seconds)}"
@@ -148,7 +150,7 @@ class Within:
             *([("not in the estimate", self.left_out)] if self.left_out else []),
             ("settings", f"{chosen.method}, rtol {chosen.rtol:g}"),
             ("cost of this run", cost),
-            ("next tighter tolerance", following),
+            ("next tighter tolerance", tighter),
         ]
         tables = [Table("accuracy, relative to peaks", (), rows)]
         if not self.explained:
@@ -240,20 +242,20 @@ def simulate_within(
 
 
 class _ModelErrorTooLargeError(Exception):
-    """The selected effects leave an error above the target at any tolerance."""
+    """The selected effects keep a run from its end, or leave an error above the target at any tolerance."""
 
 
 class _Search:
     """Runs of one scene at the candidate tolerances, each compared with a reference run.
 
-    `index` counts candidate tolerances, loosest first. Where the effects were selected (`Auto`), the reference runs
-    model all effects, so that the estimate includes the error of the selection.
+    `index`: of a candidate tolerance, loosest first. Where the effects were selected (`Auto`), the reference runs model
+    all effects, so that the estimate includes the error of the selection.
     """
 
     def __init__(self, scene: Scene, target: float, deadline: float) -> None:
         self.scene, self.target, self.deadline = scene, target, deadline
         self.trials: dict[int, Trial] = {}
-        self.references: dict[int, Trial] = {}  # by the index of the run that each is compared with
+        self.references: dict[int, Trial] = {}  # index of a run -> its reference run
         self.reference_scene = with_all_effects(scene)
         self.rings = self.reference_scene.modelled.sliders == "inertial"
         self.period = slider_period(self.reference_scene) if self.rings else float("inf")
@@ -270,7 +272,7 @@ class _Search:
         return self.trials[index]
 
     def reference(self, index: int) -> Trial:
-        """The run that the one at a candidate tolerance is compared with. Raises RunError as `trial`."""
+        """The reference run of the run at a candidate tolerance. Raises RunError as `trial`."""
         if index not in self.references:
             steps = [self.reference_scene.end / (2 * max(self.trial(index).steps, 1))]
             steps += [self.period / STEPS_PER_PERIOD] if self.rings and self.resolves_ringing else []
@@ -282,8 +284,8 @@ class _Search:
         return self.references[index]
 
     def _run(self, method: str, scene: Scene, tolerance: float) -> Trial:
-        left = self.deadline - time.perf_counter()
-        trial = run_native(method, scene, tolerance, max(left, 0.05), repeats=0)
+        remaining = self.deadline - time.perf_counter()
+        trial = run_native(method, scene, tolerance, max(remaining, 0.05), repeats=0)
         if trial.status == CUT_OFF:
             raise RunError(self._target_missed(), status="accuracy")
         return trial
@@ -291,7 +293,7 @@ class _Search:
     def loosest(self) -> int:
         """Index of the loosest tolerance that meets the target.
 
-        Raises RunError if none does, if a run and its reference run both fail, or if three reference runs do.
+        Raises RunError if no tolerance does, if a run and its reference run both fail, or if three reference runs fail.
         """
         first = next(
             k
@@ -299,21 +301,21 @@ class _Search:
             if rtol <= 10 * self.target or rtol == CANDIDATE_TOLERANCES[-1 - REFERENCE_OFFSET]
         )
         for index in range(first, len(CANDIDATE_TOLERANCES) - REFERENCE_OFFSET):
-            pair = self.trial(index), self.reference(index)
-            if not any(trial.finished for trial in pair):
-                raise RunError(pair[1].message, status=pair[1].status)
+            trial, reference = self.trial(index), self.reference(index)
+            if not trial.finished and not reference.finished:
+                raise RunError(reference.message, status=reference.status)
             estimate = self.attempt(index).estimate
             if estimate is not None and estimate <= self.target:
                 return index
-            self._check_model_error(index, first, pair[0])
+            self._check_model_error(index, first, trial)
             if sum(not reference.finished for reference in self.references.values()) > REFERENCE_OFFSET:
                 break
         raise RunError(self._target_missed(), status="accuracy")
 
     def _check_model_error(self, index: int, first: int, trial: Trial) -> None:
-        """Raise _ModelErrorTooLargeError if the selected effects keep a run from its end, or from the target.
+        """Raise _ModelErrorTooLargeError if the selected effects keep a run from its end or from the target.
 
-        The latter is so if two tighter tolerances did not reduce the error.
+        They keep it from the target if two tighter tolerances did not reduce the error. first: index of the first run.
         """
         if self.reference_scene is self.scene:
             return
@@ -326,7 +328,7 @@ class _Search:
             raise _ModelErrorTooLargeError(f"they leave an error of {known[-1]:.2g} at any tolerance")
 
     def cheapest(self, index: int) -> int:
-        """`index`, or a tighter tolerance that takes no more iterations: a loose one may lose steps to rejection."""
+        """`index`, or a tighter tolerance that takes no more iterations, since fewer of its steps are rejected."""
         while (tighter := self.next_step(index)) is not None and tighter.newton <= self.trials[index].newton:
             if tighter.estimate is None or tighter.estimate > self.target:
                 break
@@ -334,7 +336,7 @@ class _Search:
         return index
 
     def attempt(self, index: int) -> Attempt:
-        """Cost and estimated error at a candidate tolerance, by its reference run or that of the looser neighbour."""
+        """Cost and estimated error at a candidate tolerance, by its reference run or its looser neighbour's."""
         trial, differences, estimate = self.trials[index], None, None
         reference = next((self.references[k] for k in (index, index - 1) if k in self.references), None)
         if trial.finished and reference is not None and reference.finished:
@@ -346,7 +348,7 @@ class _Search:
         return Attempt(trial.method, trial.rtol, trial.seconds, trial.newton, estimate, differences, trial.status)
 
     def next_step(self, index: int) -> Attempt | None:
-        """The next tighter tolerance, run if it has not been; None if there is no time for it."""
+        """The attempt at the next tighter tolerance, run where needed; None if there is no time for it."""
         try:
             self.trial(index + 1)
         except RunError:
@@ -354,7 +356,7 @@ class _Search:
         return self.attempt(index + 1)
 
     def reasons(self, index: int) -> tuple[str, ...]:
-        """Why this method and this tolerance, in words."""
+        """The reasons for the method and the tolerance, as text."""
         looser = [k for k in sorted(self.trials) if k < index and self.attempt(k).estimate is not None]
         method = (
             f"{METHOD}: L-stable, so that stuck sliders, which ring at hundreds to thousands of hertz, do not "
@@ -374,7 +376,7 @@ class _Search:
         return method, f"{text}; the next looser tolerance, {last.rtol:g}, has an error of about {last.estimate:.2g}"
 
     def left_out(self, result: Result) -> str:
-        """What no estimate of the search includes, in words; empty if nothing."""
+        """Errors that no estimate of the search includes, as text; "" if none."""
         damping = min(surface.contact_damping for surface in self.reference_scene.bearing.surfaces)
         if not self.rings or self.resolves_ringing or pi * damping / self.period > DAMPED:
             return ""

@@ -1,4 +1,7 @@
-"""Tables of the methods and simplified models that are compared, and SciPy's integrators on the same equations."""
+"""The methods and simplified models of a study of accuracy, each as a function from a scene to a trial.
+
+Integrators of SciPy on the same equations are here; `series.py` has the models of other programs.
+"""
 
 from __future__ import annotations
 
@@ -30,13 +33,16 @@ if TYPE_CHECKING:
     from msfp_gen.model.model import Ode
     from msfp_gen.scene.scene import Scene
 
-FIRST_STEP = 1e-4  # [s], as in the runtime; the first step that some integrators choose leaves the model's range
+FIRST_STEP = 1e-4  # [s], as in the runtime; some integrators choose a first step that leaves the range of the model
 WITH_JACOBIAN = ("Radau", "BDF", "LSODA")
 
 
 @dataclass
 class Work:
-    """Cost of a run so far: evaluations of the rates, Newton iterations within them, accepted steps."""
+    """Cost of a run so far.
+
+    evaluations: of the rates. newton: Newton iterations of these evaluations. steps: accepted steps.
+    """
 
     evaluations: int = 0
     newton: int = 0
@@ -46,9 +52,9 @@ class Work:
 def run_library(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
     """Run `scene` by the SciPy integrator `name` at `rtol`, for at most about `limit` seconds of wall time.
 
-    Absolute tolerances: a hundredth of `rtol` for angles [rad], as in `Solver`, and for their rates [rad/s]; `rtol` for
-    Y and Z. No step is longer than the motion's sampling resolves, and integration restarts at each declared jump.
-    Raises InputError if the model cannot be written as an ordinary differential equation.
+    Absolute tolerances: a hundredth of `rtol` for angles [rad], as in `Solver`, and for angular rates [rad/s]; `rtol`
+    for Y and Z. No step is longer than the sampling of the motion resolves, and integration restarts at each declared
+    jump. Raises InputError if the model cannot be written as an ordinary differential equation.
     """
     require_base_motion_only(scene)
     if scene.modelled.uplift:
@@ -85,6 +91,7 @@ def run_library(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
 
 
 def _solver(kind: Any, scene: Scene, ode: Ode, work: Work, first: float, last: float, y: Array, rtol: float) -> Any:
+    """A solver of class `kind` of SciPy from time `first` to `last` [s], from state y; it counts its cost in `work`."""
     started: list[bool] = []  # empty until the solver exists: a failure at the initial state is an error
     before = np.nextafter(last, first)  # at a jump the motion returns the acceleration after it
 
@@ -113,7 +120,7 @@ def _solver(kind: Any, scene: Scene, ode: Ode, work: Work, first: float, last: f
 
 
 def _advance(solver: Any, times: Array, work: Work) -> Array:
-    """Take one step; states at the comparison times inside it, shape (k, 8(n-1)). RunError if the solver fails."""
+    """Take one step; returns the states at the comparison times within it, shape (k, 8(n-1)). Raises RunError."""
     message = solver.step()
     if solver.status == "failed":
         raise RunError(message or "the solver failed without a message", status="failed")
@@ -123,7 +130,7 @@ def _advance(solver: Any, times: Array, work: Work) -> Array:
 
 
 def _force_and_sliding(ode: Ode, times: Array, states: Array) -> tuple[Array, Array]:
-    """Horizontal force on the top support [N], shape (k, 2), and sliding [m], shape (k, n-1), of `states`.
+    """Horizontal force on the top support, shape (k, 2) [N], and sliding, shape (k, n-1) [m], of `states`.
 
     The rows end before the first state at which no acceleration is found.
     """
@@ -143,9 +150,9 @@ class Method:
 
     Attributes:
         name: as in options, tables and figures.
-        family: methods of one family share their formulas or their code, so their agreement confirms little.
-        run: (scene, setting, limit of wall time [s]) -> Trial; raises InputError if it cannot run the scene.
-        stepped: whether it has no error control: its settings are numbers of steps, not tolerances.
+        family: methods of one family share their formulas or their code, so that their agreement confirms little.
+        run: (scene, setting, limit of wall time [s]) -> Trial; raises InputError where the method cannot run the scene.
+        stepped: whether the method has no error control; its settings are then numbers of steps, else tolerances.
     """
 
     name: str
@@ -154,9 +161,9 @@ class Method:
     stepped: bool = False
 
     def attempt(self, scene: Scene, setting: float, limit: float) -> Trial:
-        """Run `scene`; a scene that it cannot run gives a trial with status "refused", an error one that failed.
+        """Run `scene`. The status of the trial is "refused" where the method cannot run the scene.
 
-        Raises RunError where the user interrupts.
+        The trial of a run that fails states the failure. Raises RunError where the user interrupts.
         """
         try:
             return replace(self.run(scene, setting, limit), method=self.name)
@@ -185,7 +192,7 @@ METHODS |= {name: Method(name, name, partial(run_library, name)) for name in LIB
 
 
 def methods_named(names: list[str] | None) -> list[Method]:
-    """Methods by name; all of them for None. Raises InputError for an unknown name."""
+    """Methods by name; None: all. Raises InputError for an unknown name."""
     for name in names or ():
         if name not in METHODS:
             raise InputError(f"methods = {name!r}: give some of {', '.join(METHODS)}")
@@ -193,10 +200,12 @@ def methods_named(names: list[str] | None) -> list[Method]:
 
 
 def _effects(name: str, **changes: Any) -> Method:
+    """A simplified model: other effects, by the default method."""
     return Method(name, "implicit", partial(_with_effects, changes))
 
 
 def _stepped(name: str, run: Callable[[Scene, int], Trial]) -> Method:
+    """A model without error control. run: (scene, number of steps) -> Trial."""
     return Method(name, name, lambda scene, steps, _: run(scene, steps), stepped=True)
 
 
@@ -215,21 +224,22 @@ def _axis_by_axis(scene: Scene, effects: Any, rtol: float, limit: float) -> Tria
     """Run a motion in two directions by one planar model for each horizontal axis, uncoupled, and combine them."""
     motions = (_along(scene.motion, axis) for axis in (0, 1))
     planar = (replace(scene, effects=effects, motion=motion, motion_table=None) for motion in motions)
-    one, two = (run_native("implicit", own, rtol, limit) for own in planar)
-    worse = max(one, two, key=lambda t: not t.finished)
-    rows = min(len(one.force), len(two.force))
-    sums = {name: getattr(one, name) + getattr(two, name) for name in ("seconds", "newton", "evaluations", "steps")}
+    along_x, along_y = (run_native("implicit", axis_scene, rtol, limit) for axis_scene in planar)
+    worse = max(along_x, along_y, key=lambda trial: not trial.finished)
+    rows = min(len(along_x.force), len(along_y.force))
+    costs = ("seconds", "newton", "evaluations", "steps")
+    sums = {name: getattr(along_x, name) + getattr(along_y, name) for name in costs}
     return replace(
         worse,
         **sums,
-        reached=min(one.reached, two.reached),
-        force=np.column_stack([one.force[:rows, 0], two.force[:rows, 1]]),
-        sliding=np.hypot(one.sliding[:rows], two.sliding[:rows]),
+        reached=min(along_x.reached, along_y.reached),
+        force=np.column_stack([along_x.force[:rows, 0], along_y.force[:rows, 1]]),
+        sliding=np.hypot(along_x.sliding[:rows], along_y.sliding[:rows]),
     )
 
 
 def _along(motion: Motion, axis: int) -> Motion:
-    """The motion with one horizontal channel only; vertical motion is kept."""
+    """The motion with its vertical channel and one horizontal channel. Raises InputError for a base that rotates."""
     if np.any(motion.coefficients[:, 3:]):
         raise InputError("motion: a base that rocks about both axes cannot be split by axis; use the spatial model")
     coefficients = motion.coefficients.copy()

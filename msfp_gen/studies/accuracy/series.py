@@ -1,8 +1,8 @@
-"""Other models of the same bearing, for comparison: published closed forms in series, and the element of OpenSees.
+"""Trials of a scene by other models of the bearing: published closed forms in series, and the element of OpenSees.
 
 The linearised bearing has springs, friction and gaps in series, small angles and no inertia. Fenz and Constantinou
-(2008) give it for triple pendulums; here it is generalised to any stack. With F = force over axial load, the slider
-over surface k tilts by F - mu_k along the motion, at most capacity/R_k more than the next body outwards. The
+(2008) give this model for triple pendulums; here it is generalised to any stack. With F = force over axial load, the
+slider over surface k tilts by F - mu_k along the motion, at most capacity/R_k more than the next body outwards. The
 displacement of the bearing is the sum of these tilts times the differences of effective radii. For a path in the
 horizontal plane, a tilt is constant while |F - tilt| < mu_k, and follows F beyond. The elements of structural analysis
 programs use the same model; `TripleFrictionPendulum` of OpenSees is run where openseespy is installed.
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
     from msfp_gen.scene.scene import Scene
 
-DIFFERENCE_STEP = 1e-8  # increment of F for difference quotients
-ROUNDING = 1e-4  # radius over which the corner at the onset of sliding is rounded, relative to the friction
+DIFFERENCE_STEP = 1e-8  # increment of F for difference quotients [-]
+ROUNDING = 1e-4  # radius of the rounded corner at the onset of sliding, over the friction coefficient
 RESIDUAL_TOLERANCE = 1e-9  # [m]
 
 
@@ -45,7 +45,7 @@ class Series:
         self.tilts = [0j] * len(self.links)
 
     def displacement(self, force: complex, load: float) -> tuple[complex, list[complex]]:
-        """Displacement across the bearing [m] and tilts [rad] at `force` over axial load; `load` is the latter [N]."""
+        """Displacement across the bearing [m], and tilts [rad], at `force` over axial load [-] and axial `load` [N]."""
         tilts: list[complex] = []
         total = 0j
         for link, tilt in zip(self.links, self.tilts, strict=True):
@@ -62,7 +62,7 @@ class Series:
         """Force over load at which the bearing and a spring of `flexibility` [m] in series move by `target` [m].
 
         Newton's method with difference quotients; steps that increase the residual are halved. The tilts of the
-        solution become the current ones. Raises RunError if the method does not converge.
+        solution become the current tilts. Raises RunError if the method does not converge.
         """
 
         def residual(force: complex) -> complex:
@@ -87,18 +87,18 @@ class Series:
 
     def sliding(self, force: complex, count: int) -> list[float]:
         """Sliding of every surface at the current tilts [m], shape (count,)."""
-        out = [0.0] * count
+        sliding = [0.0] * count
         for link, tilt in zip(self.links, self.tilts, strict=True):
             outside = 0j if link.outside is None else self.tilts[link.outside]
             elastic = link.yielding * _friction_state(link, force - tilt)
-            out[link.surface] = abs(link.radius * (tilt - outside) + elastic)
-        return out
+            sliding[link.surface] = abs(link.radius * (tilt - outside) + elastic)
+        return sliding
 
 
 def _updated_tilt(force: complex, tilt: complex, friction: float) -> complex:
     """The tilt after `force` is applied: constant while |force - tilt| < friction, following the force beyond.
 
-    The corner between both is rounded, since Newton's method does not converge over it.
+    The corner at |force - tilt| = friction is rounded, since Newton's method does not converge over it.
     """
     distance = abs(force - tilt)
     if not distance:
@@ -108,7 +108,7 @@ def _updated_tilt(force: complex, tilt: complex, friction: float) -> complex:
 
 
 def _friction_state(link: Link, traction: complex) -> complex:
-    """Friction state Y + iZ of the surface under the horizontal force over load that it transmits; at most one."""
+    """Friction state Y + iZ of a surface, at most one in size. traction: horizontal force over load on it."""
     return traction / max(link.friction, abs(traction), 1e-300)
 
 
@@ -147,7 +147,10 @@ def run_series(scene: Scene, steps: int, arms: bool = False) -> Trial:
 
 
 def _trial(name: str, scene: Scene, steps: int, times: Array, columns: Array, seconds: float) -> Trial:
-    """The trial of a run in equal steps from its force and sliding at times, which may end before the scene does."""
+    """The trial of a run in equal steps. times: of its steps; a run that failed ends before the scene.
+
+    columns: force [N] and sliding [m] at the times, shape (T, 2 + surfaces).
+    """
     at, last = comparison_times(scene.end), float(times[-1])
     at = at[at <= last * (1 + 1e-12)]
     rows = np.column_stack([np.interp(at, times, column) for column in columns.T])
@@ -159,11 +162,12 @@ def _trial(name: str, scene: Scene, steps: int, times: Array, columns: Array, se
 
 
 def _as_complex(vectors: Array) -> list[complex]:
+    """The horizontal components of vectors, shape (T, 3), as complex numbers x + iy."""
     return [complex(x, y) for x, y in vectors[:, :2].tolist()]
 
 
 def _run_rig(scene: Scene, series: Series, times: Array) -> tuple[Array, Array]:
-    """Impose displacements through the springs of a rig: force [N], shape (T,), and sliding [m], shape (T, n-1)."""
+    """Impose displacements through the springs of a rig; returns force, (T,) [N], and sliding, shape (T, n-1) [m]."""
     top = scene.top
     assert isinstance(top, RigTop)
     load, count = top.axial_load, scene.bearing.layout.surfaces
@@ -179,7 +183,10 @@ def _run_rig(scene: Scene, series: Series, times: Array) -> tuple[Array, Array]:
 
 
 def _run_mass(scene: Scene, series: Series, times: Array) -> tuple[Array, Array]:
-    """Integrate a mass on the bearing by central differences; the axial load follows the vertical acceleration."""
+    """Integrate a mass on the bearing by central differences; the axial load follows the vertical acceleration.
+
+    Returns as `_run_rig`.
+    """
     top = scene.top
     assert isinstance(top, MassTop)
     ground, count, step = scene.motion.acceleration(times), scene.bearing.layout.surfaces, float(times[1])
@@ -193,13 +200,13 @@ def _run_mass(scene: Scene, series: Series, times: Array) -> tuple[Array, Array]
     return np.array(forces), np.array(sliding)
 
 
-BASE, TOP, ELEMENT = 1, 2, 1
-STIFF = 1e10
-YIELD = 1e-4  # [m]: least yield displacement passed to the element, whose manual recommends 0.25 to 1 mm
+BASE, TOP, ELEMENT = 1, 2, 1  # tags of the nodes and of the element
+STIFF = 1e10  # stiffness of the other degrees of freedom [N/m, N m/rad]
+YIELD = 1e-4  # least yield displacement passed to the element [m]; its manual recommends 0.25 to 1 mm
 
 
 def run_opensees(scene: Scene, steps: int) -> Trial:
-    """Run `scene` by OpenSees in `steps` equal steps. The element gives no sliding of surfaces, so the trial has none.
+    """Run `scene` by OpenSees in `steps` equal steps. The trial has no sliding, since the element computes none.
 
     Raises InputError if OpenSees is not installed, or the element cannot represent this bearing under this load.
     """
@@ -225,7 +232,7 @@ def run_opensees(scene: Scene, steps: int) -> Trial:
 
 
 def _links(scene: Scene) -> tuple[Link, Link, Link]:
-    """Outer lower, outer upper and inner surface; the element takes one friction and radius for both inner ones."""
+    """Outer lower, outer upper and inner surface; the element has one friction and radius for both inner surfaces."""
     if scene.bearing.layout != Layout.tfp():
         raise InputError("bearing.layout: TripleFrictionPendulum has four surfaces, (5, 2, 2)")
     if not _load(scene):
@@ -267,7 +274,10 @@ def _define_model(ops: Any, scene: Scene, lower: Link, upper: Link, inner: Link)
 
 
 def _integrate(ops: Any, scene: Scene, times: Array) -> tuple[int, Array]:
-    """Apply the axial load, then the motion; number of steps taken, and horizontal force after each [N], (k, 2)."""
+    """Apply the axial load, then the motion; returns the number of steps, and the horizontal forces, (k, 2) [N].
+
+    The first row is the start, with zero force.
+    """
     ops.timeSeries("Linear", 1)
     ops.pattern("Plain", 1, 1)
     ops.load(TOP, 0.0, 0.0, -_load(scene), 0.0, 0.0, 0.0)
@@ -289,7 +299,7 @@ def _integrate(ops: Any, scene: Scene, times: Array) -> tuple[int, Array]:
 
 
 def _padded(values: Array) -> list[float]:
-    """`values` with the last one repeated: OpenSees takes zero after the end, where rounding may put the last step."""
+    """`values`, the last one twice: OpenSees takes zero after the end, where rounding may put the last step."""
     return [*values.tolist(), float(values[-1])]
 
 
@@ -319,6 +329,7 @@ def _dynamic(ops: Any, scene: Scene, times: Array) -> None:
 
 
 def _settings(ops: Any) -> None:
+    """Set constraints, equations and Newton's method of an analysis."""
     ops.constraints("Transformation")
     ops.numberer("Plain")
     ops.system("FullGeneral")

@@ -1,7 +1,7 @@
-"""Error against cost on one scene, of methods at several tolerances and of simplified models, and its output.
+"""Error against cost on one scene, of methods at several tolerances and of simplified models.
 
-All errors are measured against one confirmed reference. The output is tables, CSV, JSON, Markdown and a figure, with
-the machine that the times are of.
+A scene comes in; all errors are measured against one confirmed reference; tables, CSV, JSON, Markdown and a figure go
+out, with the machine on which the times were measured.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ if TYPE_CHECKING:
 TOLERANCES = tuple(10.0**-k for k in range(2, 10))
 MODEL_TOLERANCES = TOLERANCES[:6]
 STEPS = (250, 1000, 4000)  # numbers of steps of models without error control
-CONFIRMING = ("Radau", (1e-4, 1e-5))  # method and tolerances that confirm the reference: the most robust of SciPy's
-LIMIT = 10.0  # [s] of wall time per run
+CONFIRMING = ("Radau", (1e-4, 1e-5))  # method and tolerances that confirm the reference: the most robust of SciPy
+LIMIT = 10.0  # wall time of a run [s]
 CONFIRMING_LIMIT = 6.0  # time limit of a rerun that may confirm the reference, over the limit of other runs
-CONFIRMING_RUNS = 2  # most of such reruns
+CONFIRMING_RUNS = 2  # number of such reruns, at most
 TIGHTEST = 1e-11  # least tolerance of a reference run
-WRONG = 30.0  # a success is wrong if its RMS error exceeds this many tolerances,
-NEVER_WRONG, ALWAYS_WRONG = 1e-3, 0.1  # but never below the first error, and always above the second
+WRONG = 30.0  # RMS error over tolerance above which a success is wrong
+NEVER_WRONG, ALWAYS_WRONG = 1e-3, 0.1  # RMS error below which a success is never wrong, above which it always is
 FAMILIES = {name: method.family for name, method in METHODS.items()}
 Say = Callable[[str], None]
 NAMES = tuple(field.name for field in fields(Errors))
@@ -60,9 +60,9 @@ class Point:
     """One run of a study.
 
     Attributes:
-        series: the method or model.
+        series: name of the method or model.
         trial: the run.
-        errors: against the reference; None for the reference itself and for runs that did not finish.
+        errors: against the reference; None for the reference itself and for a run that did not finish.
         wrong: whether the run reported success with a wrong result (`is_wrong`).
     """
 
@@ -73,7 +73,7 @@ class Point:
 
     @property
     def known_errors(self) -> dict[str, float | None]:
-        """Name -> error [-]; None where it is not defined."""
+        """Name of an error, as in `Errors` -> error [-]; None where undefined."""
         known = {} if self.errors is None else self.errors.as_dict()
         return {name: known[name] if isfinite(known.get(name, nan)) else None for name in NAMES}
 
@@ -83,11 +83,11 @@ class Study:
     """A study of one scene.
 
     Attributes:
-        scene: the scene that was run.
+        scene: as it was run.
         kind: "work-precision" or "model-error".
         points: the runs.
         reference: the run that errors are measured against.
-        notes: what was left out, and what limits the reference, in words.
+        notes: on settings that were not run, and on the reference, as text.
     """
 
     scene: Scene
@@ -120,21 +120,21 @@ def work_precision(
         scene: the scene.
         methods: names in `METHODS`; None: all.
         tolerances: relative tolerances [-].
-        limit: wall time of one run [s]. A longer run is cut off; after two of those in a row tighter tolerances of the
-            method are not tried.
+        limit: wall time of one run [s]. A longer run is cut off; after two runs of a method in a row that were cut off,
+            its tighter tolerances are not tried.
         say: called with one line of text after each run.
 
     Raises:
         InputError: an invalid tolerance, limit or method, or a bearing that does not move.
         RunError: no run finished.
     """
-    chosen = methods_named(None if methods is None else list(methods))
+    compared = methods_named(None if methods is None else list(methods))
     check_settings(tolerances, limit)
     scene, trials, notes = without_stop(scene), [], []
-    for method in chosen:
-        runs, left_out = run_tolerances(method, scene, sorted(tolerances, reverse=True), limit, say)
+    for method in compared:
+        runs, own_notes = run_tolerances(method, scene, sorted(tolerances, reverse=True), limit, say)
         trials += runs
-        notes += left_out
+        notes += own_notes
     trials = with_reruns(trials, confirming_reruns(scene, trials, limit, say))
     reference = best_reference([*trials, *tighter_runs(scene, trials, limit, say)], FAMILIES)
     points = tuple(point_of(trial.method, trial, reference) for trial in trials)
@@ -148,10 +148,10 @@ def model_errors(
     limit: float = LIMIT,
     say: Say = lambda line: None,
 ) -> Study:
-    """Error against cost of the scene as given and of simplified models, all against a reference of the former.
+    """Error against cost of the given scene and of simplified models, against a reference run of the given scene.
 
     The error of a simplified model falls with its tolerance down to the error of the simplification. Arguments and
-    exceptions are those of `work_precision`.
+    errors: as of `work_precision`.
     """
     check_settings(tolerances, limit)
     scene = without_stop(scene)
@@ -162,10 +162,10 @@ def model_errors(
     reference = best_reference([*full, *extra], FAMILIES)
     points, notes = [point_of("as it stands", trial, reference) for trial in full], reference_notes(reference)
     for variant in VARIANTS:
-        trials, left_out = _variant_trials(variant, scene, tolerances, limit, say)
-        # A simplified model may miss its tolerance by its model error, which is no wrong success.
+        trials, own_notes = _variant_trials(variant, scene, tolerances, limit, say)
+        # The error of a simplified model may exceed its tolerance, which is no wrong success.
         points += [replace(point_of(variant.name, trial, reference), wrong=False) for trial in trials]
-        notes += left_out
+        notes += own_notes
     return Study(scene, "model-error", tuple(points), reference, tuple(notes))
 
 
@@ -186,7 +186,7 @@ def _variant_trials(
 
 
 def _step_counts(scene: Scene) -> list[int]:
-    """Numbers of steps: STEPS, or one, two and four per sampling interval of a long record."""
+    """Numbers of steps: STEPS; for a long record one, two and four steps in each of its sampling intervals."""
     least = 1 if scene.motion.max_step is None else int(np.ceil(scene.end / scene.motion.max_step))
     return [least, 2 * least, 4 * least] if least > STEPS[1] else list(STEPS)
 
@@ -203,14 +203,14 @@ def check_settings(tolerances: Sequence[float], limit: float) -> None:
 
 
 def without_stop(scene: Scene) -> Scene:
-    """The scene without its stop condition, which SciPy's integrators do not have, ending where the stop would end it.
+    """The scene with a duration up to its stop condition in place of this condition, which SciPy does not have.
 
-    All effects are modelled, so that no run changes them on its way; uplift only where `Auto` selects it at the start,
-    since most of the methods have none: a run in which a surface opens then fails.
+    All effects are modelled, so that no run changes its model. Uplift is modelled only where `Auto` selects it at the
+    start, since most methods have no uplift: a run in which a surface opens then fails.
     """
-    every = with_all_effects(scene)
-    if every is not scene:
-        scene = replace(every, effects=replace(every.modelled, uplift=scene.modelled.uplift))
+    complete = with_all_effects(scene)
+    if complete is not scene:
+        scene = replace(complete, effects=replace(complete.modelled, uplift=scene.modelled.uplift))
     if scene.stop is None:
         return scene
     end = float(simulate(replace(scene, output_step=None)).history.time[-1])
@@ -220,7 +220,7 @@ def without_stop(scene: Scene) -> Scene:
 def run_tolerances(
     method: Method, scene: Scene, tolerances: Sequence[float], limit: float, say: Say
 ) -> tuple[list[Trial], list[str]]:
-    """Run one method at `tolerances`, loosest first; the runs, and notes on what was left out."""
+    """Run one method at `tolerances`, loosest first; returns the runs, and notes on tolerances that were not run."""
     trials: list[Trial] = []
     for count, rtol in enumerate(tolerances):
         trial = method.attempt(scene, rtol, limit)
@@ -240,9 +240,9 @@ def trial_line(trial: Trial) -> str:
 
 
 def tighter_runs(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
-    """Default runs below the tightest tolerance that finished, until one does not finish: for a reference."""
-    done = [t.rtol for t in trials if t.method == "implicit" and t.finished]
-    rtol, tighter = min(done, default=1e-2) / 10, []
+    """Runs for a reference: the default method below its tightest finished tolerance, until a run does not finish."""
+    finished = [trial.rtol for trial in trials if trial.method == "implicit" and trial.finished]
+    rtol, tighter = min(finished, default=1e-2) / 10, []
     while rtol > TIGHTEST:
         trial = METHODS["implicit"].attempt(scene, rtol, limit)
         say(f"reference: {trial_line(trial)}")
@@ -256,11 +256,12 @@ def tighter_runs(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) 
 def confirming_reruns(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
     """Repeat runs that were cut off with a longer limit, as candidates for the reference.
 
-    Of each method the tightest that can finish within that limit; of these the CONFIRMING_RUNS fastest.
+    Of each method the tightest run that can finish within the longer limit counts; the CONFIRMING_RUNS fastest of these
+    runs are repeated.
     """
     longer = CONFIRMING_LIMIT * limit
-    possible = [t for t in trials if t.status == CUT_OFF and 1.3 * t.expected_seconds < longer]
-    tightest = {t.method: t for t in sorted(possible, key=lambda t: -t.rtol)}
+    possible = [trial for trial in trials if trial.status == CUT_OFF and 1.3 * trial.expected_seconds < longer]
+    tightest = {trial.method: trial for trial in sorted(possible, key=lambda trial: -trial.rtol)}
     reruns = []
     for trial in sorted(tightest.values(), key=lambda t: t.expected_seconds)[:CONFIRMING_RUNS]:
         reruns.append(METHODS[trial.method].attempt(scene, trial.rtol, longer))
@@ -269,19 +270,19 @@ def confirming_reruns(scene: Scene, trials: Sequence[Trial], limit: float, say: 
 
 
 def with_reruns(trials: Sequence[Trial], reruns: Sequence[Trial]) -> list[Trial]:
-    """`trials`, each replaced by its repetition where there is one."""
-    known = {(trial.method, trial.rtol): trial for trial in reruns}
-    return [known.get((trial.method, trial.rtol), trial) for trial in trials]
+    """`trials`, with a repeated run in place of the run that was cut off."""
+    repeated = {(trial.method, trial.rtol): trial for trial in reruns}
+    return [repeated.get((trial.method, trial.rtol), trial) for trial in trials]
 
 
 def point_of(series: str, trial: Trial, reference: Reference) -> Point:
-    """One run as a point of a series; the reference and runs that did not finish have no errors."""
+    """A run as a point of a series; the reference and a run that did not finish have no errors."""
     differences = errors(trial, reference.trial) if trial.finished and trial is not reference.trial else None
     return Point(series, trial, differences, differences is not None and is_wrong(trial, differences, reference))
 
 
 def is_wrong(trial: Trial, differences: Errors, reference: Reference) -> bool:
-    """Whether a run reported success while its RMS error is far above its tolerance and above the reference's floor."""
+    """Whether a run reported success with an RMS error far above its tolerance and above the floor of the reference."""
     if reference.floor is None:
         return False
     floor = 3 * reference.floor.worst_rms
@@ -289,7 +290,7 @@ def is_wrong(trial: Trial, differences: Errors, reference: Reference) -> bool:
 
 
 def reference_notes(reference: Reference) -> list[str]:
-    """Notes on how far the reference can be relied on."""
+    """Notes on how well the reference is confirmed."""
     if reference.second is None or reference.floor is None:
         return ["only one run reached the end: nothing confirms the reference"]
     if not reference.independent:
@@ -306,7 +307,7 @@ HEADS = (
 
 
 def machine() -> dict[str, str]:
-    """Name -> text: processor, cores, system, compiler, versions, commit of a checkout; without unknown ones."""
+    """Name -> text of processor, cores, system, compiler, versions, and commit of a checkout, as far as known."""
     from msfp_gen.jit.compiler import FLAGS, find_compiler
 
     try:
@@ -338,7 +339,7 @@ def machine() -> dict[str, str]:
 
 
 def rows(study: Study) -> list[dict[str, Any]]:
-    """One dict of plain values per point; None where a value is not defined."""
+    """One dict of plain values for each point; None where a value is undefined."""
     return [
         {
             "series": point.series,
@@ -404,23 +405,23 @@ def markdown(study: Study) -> str:
 
 
 def figure_table(study: Study) -> dict[str, dict[str, list[float]]]:
-    """The table that `plot_work_precision` draws: series -> column -> values; without series that could not run."""
-    out: dict[str, dict[str, list[float]]] = {}
+    """Series -> column -> values, as `plot_work_precision` draws them; without series that could not run."""
+    table: dict[str, dict[str, list[float]]] = {}
     for series in study.series:
         points = [p for p in study.of(series) if p.trial.status != REFUSED]
         if not points:
             continue
         columns = {"seconds": [p.trial.expected_seconds for p in points]}
-        share = [max(p.trial.reached / p.trial.end, 1e-9) if p.trial.status == CUT_OFF else 1.0 for p in points]
+        shares = [max(p.trial.reached / p.trial.end, 1e-9) if p.trial.status == CUT_OFF else 1.0 for p in points]
         if any(p.trial.newton for p in points):
-            columns["newton"] = [p.trial.newton / part for p, part in zip(points, share, strict=True)]
+            columns["newton"] = [p.trial.newton / share for p, share in zip(points, shares, strict=True)]
         for name in ERRORS:
             columns[name] = [nan if p.errors is None else getattr(p.errors, name) for p in points]
         columns["cut"] = [float(p.trial.status == CUT_OFF) for p in points]
         columns["failed"] = [float(not p.trial.finished and p.trial.status != CUT_OFF) for p in points]
         columns["wrong"] = [float(p.wrong) for p in points]
-        out[series] = columns
-    return out
+        table[series] = columns
+    return table
 
 
 def draw(study: Study, path: str | Path) -> None:

@@ -1,4 +1,4 @@
-"""One run of a study of accuracy: its cost, the histories that are compared, and its error against a reference run."""
+"""One run of a study of accuracy, as a `Trial`: its cost, the compared histories, and its error against a reference."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ ERRORS = {
     "sliding_rms": "sliding, RMS",
 }
 ROWS = 2000  # intervals between the instants at which runs are compared
-QUICK, REPEATS = 0.1, 5  # runs shorter than this [s] are timed this often; the fastest counts
+QUICK, REPEATS = 0.1, 5  # a run shorter than the first [s] is timed as often as the second; the fastest counts
 CUT_OFF, REFUSED, OK = "cut off", "refused", "ok"
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of one run [-]: of the horizontal top force over its peak, of sliding over its largest on any surface.
+    """Errors of one run [-]: of the horizontal top force over its peak, of sliding over its peak on any surface.
 
     Attributes:
-        force_max, sliding_max: at the worst instant (and surface).
-        force_rms, sliding_rms: RMS over time (of the worst surface).
-        force_peak, sliding_peak: of the peak value alone, whenever it occurs.
+        force_max, sliding_max: at the worst instant; of sliding, of the worst surface.
+        force_rms, sliding_rms: RMS over time; of sliding, of the worst surface.
+        force_peak, sliding_peak: of the peak value, whenever it occurs.
 
-    Errors of sliding are NaN for a run that does not give sliding displacements.
+    Errors of sliding are NaN for a run without sliding displacements.
     """
 
     force_max: float
@@ -49,7 +49,7 @@ class Errors:
 
     @property
     def worst_rms(self) -> float:
-        """The larger of the two RMS errors."""
+        """The larger of the RMS errors of force and sliding [-]."""
         return float(np.fmax(self.force_rms, self.sliding_rms))
 
     def as_dict(self) -> dict[str, float]:
@@ -63,9 +63,9 @@ class Reference:
 
     Attributes:
         trial: the reference run.
-        second: the confirming run; None if there is none.
-        floor: difference of the two runs, below which errors are not known; None without a second run.
-        independent: whether the two runs use different families of methods.
+        second: the confirming run, or None.
+        floor: difference of the two runs, below which errors are unknown; None without a second run.
+        independent: whether the two runs are by methods of different families.
     """
 
     trial: Trial
@@ -75,9 +75,9 @@ class Reference:
 
 
 def errors(trial: Trial, reference: Trial) -> Errors | None:
-    """Errors of `trial` against `reference` over the rows that both have; None if `trial` has no rows.
+    """Errors of `trial` against `reference` over the common rows; None if there are none.
 
-    Raises InputError if the reference has no force or no sliding to be relative to.
+    Raises InputError if force or sliding of the reference are zero, so that relative errors are undefined.
     """
     rows = min(len(trial.force), len(reference.force))
     if not rows:
@@ -99,12 +99,12 @@ def errors(trial: Trial, reference: Trial) -> Errors | None:
 
 
 def largest_error(differences: Errors) -> float:
-    """The error that a target bounds: the largest of the RMS and peak errors of force and sliding, relative [-]."""
+    """The relative error that a target bounds: the largest of the RMS and peak errors of force and sliding [-]."""
     return max(differences.force_rms, differences.sliding_rms, differences.force_peak, differences.sliding_peak)
 
 
 def _peaks(trial: Trial) -> tuple[float, float]:
-    """Peak horizontal force [N] and largest sliding displacement [m]; NaN for sliding that a run does not give."""
+    """Peak horizontal force [N] and largest sliding displacement [m], NaN for a run without sliding."""
     sliding = float(trial.sliding.max()) if trial.sliding.size else float("nan")
     return float(np.linalg.norm(trial.force, axis=1).max()), sliding
 
@@ -114,9 +114,9 @@ def _rms(values: Array) -> Array:
 
 
 def best_reference(trials: Iterable[Trial], families: dict[str, str]) -> Reference:
-    """The pair of runs that agree best, among the tightest finished run of each method; the tighter is the reference.
+    """The two runs that agree best among the tightest finished runs of all methods; the tighter is the reference.
 
-    Pairs of different families are preferred. Without such a pair, two methods of one family or two tolerances of one
+    Two runs of different families are preferred. Without these, two methods of one family or two tolerances of one
     method are used: the floor is then a lower bound, and `Reference.independent` is false.
 
     Args:
@@ -148,14 +148,13 @@ class Trial:
     Attributes:
         method: name of the method or model.
         rtol: relative tolerance [-]; the step [s] if `stepped`.
-        status: "ok", "cut off" (by the time limit), "refused" (the method cannot run this scene), or how the run
-            failed.
-        seconds: wall time of the integration [s], up to the cut for a run that was cut off.
-        reached, end: simulated time, and the end of the scene [s].
-        newton: Newton iterations on the equations of motion, in all loops.
-        evaluations, steps: evaluations of the equations; accepted steps.
+        status: "ok", "cut off" (by the time limit), "refused" (the method cannot run this scene), or the failure.
+        seconds: wall time of the integration [s], for a run that was cut off until then.
+        reached, end: simulated time at the end of the run, and end of the scene [s].
+        newton: number of Newton iterations on the equations of motion, in all loops.
+        evaluations, steps: numbers of evaluations of the equations, and of accepted steps.
         force: horizontal force on the top support at the first K of `comparison_times(end)`, shape (K, 2) [N].
-        sliding: sliding of every surface at the same times, shape (K, n-1) [m].
+        sliding: sliding of every surface at these times, shape (K, n-1) [m].
         message: one line about a failure.
         stepped: whether the method has no error control.
     """
@@ -176,7 +175,7 @@ class Trial:
 
     @property
     def setting(self) -> str:
-        """The tolerance, or the step with its unit, as text."""
+        """The tolerance, or for a stepped method the step with its unit, as text."""
         return f"{self.rtol:.3g} s" if self.stepped else f"{self.rtol:g}"
 
     @property
@@ -198,13 +197,13 @@ def comparison_times(end: float) -> Array:
 
 
 def refused_trial(method: str, rtol: float, scene: Scene, why: str) -> Trial:
-    """The trial of a method that cannot run this scene."""
+    """The trial of a method that cannot run a scene. why: its message."""
     empty = np.zeros((0, 2)), np.zeros((0, scene.bearing.layout.surfaces))
     return Trial(method, rtol, REFUSED, 0.0, 0.0, scene.end, 0, 0, 0, *empty, message=why)
 
 
 def require_base_motion_only(scene: Scene) -> None:
-    """Raise InputError for a scene with a load or a rotation of the top, which this method would ignore."""
+    """Raise InputError for a scene with a load or a rotation of the top, which the calling method would ignore."""
     for name in ("load", "top_rotation"):
         if getattr(scene, name) is not None:
             raise InputError(f"{name}: this method applies the motion of the base only; leave {name} or the method out")
@@ -213,13 +212,13 @@ def require_base_motion_only(scene: Scene) -> None:
 def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int = REPEATS) -> Trial:
     """Run `scene` by a method of the compiled runtime at `rtol`, for at most about `limit` seconds of wall time.
 
-    repeats: how often a run shorter than QUICK is repeated for its time; 0: not. Raises InputError if the method cannot
-    run the scene.
+    repeats: number of repetitions of a run shorter than QUICK, for its time. Raises InputError if the method cannot run
+    the scene.
     """
     solver = replace(scene.solver, method=cast("Any", name), rtol=rtol, atol_angle=None)
-    compared = replace(scene, solver=solver, output_step=scene.end / ROWS)
+    sampled = replace(scene, solver=solver, output_step=scene.end / ROWS)
     try:
-        result = run_to_end(compared, seconds=limit)
+        result = run_to_end(sampled, seconds=limit)
         status, message = OK if result.succeeded else result.status, result.message
     except RunError as error:
         result, status, message = None, error.status or "failed", str(error)
@@ -231,8 +230,8 @@ def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int 
         raise RunError(message, status=status, result=result)
     counters = result.counters
     if repeats and status == OK and counters.wall_time < QUICK:
-        plain = replace(scene, solver=solver, output_step=None)
-        seconds = min(simulate(plain).counters.wall_time for _ in range(repeats))
+        unsampled = replace(scene, solver=solver, output_step=None)
+        seconds = min(simulate(unsampled).counters.wall_time for _ in range(repeats))
         counters = replace(counters, wall_time=seconds)
     history = result.history
     return Trial(
@@ -252,16 +251,16 @@ def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int 
 
 
 def dopri5_cost(scene: Scene) -> tuple[str, ...]:
-    """The cost of the method of PEER 2017/07, extrapolated from half a second of wall time."""
+    """The cost of the method of PEER 2017/07 as text, extrapolated from half a second of wall time."""
     try:
-        burst = run_native("dopri5", scene, 1e-3, 0.5, repeats=0)
+        trial = run_native("dopri5", scene, 1e-3, 0.5, repeats=0)
     except InputError as error:
         return (f"dopri5 cannot run this scene: {error}",)
-    if burst.finished:
-        return (f"dopri5, the method of PEER 2017/07, takes {burst.seconds:.2g} s at rtol 1e-3",)
-    if burst.status != CUT_OFF or not burst.reached:
-        return (f"dopri5, the method of PEER 2017/07, fails here: {burst.message}",)
+    if trial.finished:
+        return (f"dopri5, the method of PEER 2017/07, takes {trial.seconds:.2g} s at rtol 1e-3",)
+    if trial.status != CUT_OFF or not trial.reached:
+        return (f"dopri5, the method of PEER 2017/07, fails here: {trial.message}",)
     return (
-        f"dopri5, the method of PEER 2017/07, resolves the ringing: about {burst.expected_seconds:.2g} s at its rate "
-        f"over the first {burst.reached:.2g} s of motion",
+        f"dopri5, the method of PEER 2017/07, resolves the ringing: about {trial.expected_seconds:.2g} s at its rate "
+        f"over the first {trial.reached:.2g} s of motion",
     )
