@@ -1,4 +1,7 @@
-"""`Building`: a linear superstructure on attachment nodes, by its frame or by matrices in files (docs/buildings.md)."""
+"""`Building`: a linear superstructure with nodes for bearings, from a frame or from matrices (docs/buildings.md).
+
+Floors and columns, or arrays and files, come in; M, C, K and nodes go out, for a `BuildingScene`.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +23,15 @@ from msfp_gen.common.fields import LARGEST, require_type
 from msfp_gen.common.inputs import read_input
 
 Indices = NDArray[np.intp]
-_FORMS = {"coordinate": 3, "array": 2}  # with the number of sizes
+_FORMS = {"coordinate": 3, "array": 2}  # form of a Matrix Market file -> numbers in the line of sizes
 _HEADER = "%%MatrixMarket matrix coordinate|array real|integer general|symmetric"
 
 
 def read_matrix(text: str, most: int) -> Array:
-    """The matrix of a file, real, general or symmetric, dense or as coordinates: ndarray, shape (rows, columns), [SI].
+    """The matrix in the text of a Matrix Market file: ndarray, shape (rows, columns), [SI].
 
-    most: largest number of rows and of columns. Raises ValueError of one line.
+    Real or integer, general or symmetric, dense or as coordinates. most: largest number of rows and of columns. Raises
+    ValueError of one line.
     """
     lines = text.splitlines()
     words = lines[0].lower().split() if lines else []
@@ -46,7 +50,7 @@ def read_matrix(text: str, most: int) -> Array:
     if any(len(row) != width for row in rows[1:]):
         raise ValueError(f"a line of an entry has not {width} numbers")
     values = np.array(rows[1:], dtype=float).reshape(-1, width)
-    at = _places(values, shape) if form == "coordinate" else _columns(shape, symmetry)
+    at = _indices_of_coordinates(values, shape) if form == "coordinate" else _indices_of_array(shape, symmetry)
     expected = int(rows[0][2]) if form == "coordinate" else len(at[0])
     if len(values) != expected:
         raise ValueError(f"{len(values)} entries, the line of sizes says {expected}")
@@ -55,34 +59,37 @@ def read_matrix(text: str, most: int) -> Array:
     return matrix if symmetry == "general" else matrix + np.tril(matrix, -1).T + np.triu(matrix, 1).T
 
 
-def _places(values: Array, shape: tuple[int, int]) -> tuple[Indices, Indices]:
-    """Row and column of every entry, from 0."""
-    places = values[:, :2]
-    if not np.all((places >= 1) & (places <= shape) & (places == np.floor(places))):
+def _indices_of_coordinates(values: Array, shape: tuple[int, int]) -> tuple[Indices, Indices]:
+    """Row and column of every entry of the form "coordinate", from 0, shape (entries,). Raises ValueError."""
+    positions = values[:, :2]
+    if not np.all((positions >= 1) & (positions <= shape) & (positions == np.floor(positions))):
         raise ValueError("an entry is outside the matrix; rows and columns are counted from 1")
-    indices = places.astype(np.intp) - 1
+    indices = positions.astype(np.intp) - 1
     return indices[:, 0], indices[:, 1]
 
 
-def _columns(shape: tuple[int, int], symmetry: str) -> tuple[Indices, Indices]:
-    """Row and column of the entries of a dense matrix, by columns; of a symmetric one, from the diagonal on."""
+def _indices_of_array(shape: tuple[int, int], symmetry: str) -> tuple[Indices, Indices]:
+    """Row and column of every entry of the form "array", from 0, shape (entries,).
+
+    Entries are by columns; a column of a symmetric matrix begins at the diagonal.
+    """
     columns, rows = (index.ravel() for index in np.indices(shape[::-1]))
     kept = rows >= columns if symmetry == "symmetric" else np.full(rows.shape, True)
     return rows[kept], columns[kept]
 
 
-_HIGHEST = 1e6  # frequency [Hz]
+_HIGHEST = 1e6  # largest frequency that is accepted [Hz]
 
 
 @dataclass(frozen=True, eq=False)
 class Building:
-    """A linear superstructure that only its bearings hold: M, C, K and nodes.
+    """A linear superstructure that is held by its bearings alone: M, C, K and nodes.
 
     The coordinates are displacements relative to the position at rest, in axes that do not move; rotations are small.
-    Make one with `Building.shear` or `Building.from_matrices`.
+    `Building.shear` and `Building.from_matrices` make one.
 
     mass, damping, stiffness: ndarray, shape (n, n), [kg], [N s/m], [N/m] and the like for rotations. nodes: points
-    whose motion is stated; bearings are attached to those that carry them. columns: of the storeys of a shear frame.
+    whose motion is a result; bearings are attached to nodes with `carries`. columns: of the storeys of a shear frame.
     """
 
     mass: Array
@@ -99,11 +106,13 @@ class Building:
         damping_ratio: float | Sequence[float] = 0.02,
         rayleigh_frequencies: tuple[float, float] | None = None,
     ) -> Building:
-        """A frame of rigid floors on columns, its base on the bearings; see `BaseSlab` and `Storey`.
+        """A frame of rigid floors on columns, with its base on the bearings; see `BaseSlab` and `Storey`.
 
-        damping_ratio: of the modes on a fixed base, one for all or one for each from the lowest. rayleigh_frequencies
-        [Hz]: the damping is that of Rayleigh with this one ratio at both frequencies. Its node that carries bearings
-        is "base", at any place of the plan. Raises InputError.
+        Bearings are attached to the node "base", at any position in plan.
+
+        damping_ratio: of the modes on a fixed base: one number for all modes, or one for each mode from the lowest.
+        rayleigh_frequencies: two frequencies at which Rayleigh damping has the damping ratio, then one number [Hz].
+        Raises InputError.
         """
         require_type(base, BaseSlab, "base")
         for index, storey in enumerate(storeys):
@@ -125,10 +134,10 @@ class Building:
     ) -> Building:
         """A building of given matrices: square arrays, or files of Matrix Market (.mtx) or NumPy (.npz).
 
-        In a .npz file the arrays are called mass, damping and stiffness. The stiffness is that of the structure without
-        supports. damping: None: of the ratio, as in `shear`. nodes: name -> (indices of the six coordinates that are
-        displacements along E1, E2, E3 and rotations about them; position [m]), where bearings may be attached. Raises
-        InputError.
+        The arrays of a .npz file have the names mass, damping and stiffness. stiffness: of the structure without
+        supports. damping: None: by damping_ratio, as in `shear`. nodes: to which bearings may be attached, name ->
+        (indices of the six coordinates of displacements along E1, E2, E3 and rotations about these axes; position [m]).
+        Raises InputError.
         """
         m, k = matrix_of(mass, "mass"), matrix_of(stiffness, "stiffness")
         c = np.zeros_like(m) if damping is None else matrix_of(damping, "damping")
@@ -143,7 +152,7 @@ class Building:
 
     @cached_property
     def boundary(self) -> tuple[int, ...]:
-        """Coordinates of the nodes that carry bearings. Raises InputError where two share one."""
+        """Indices of the coordinates of the nodes that carry bearings. Raises InputError where nodes share any."""
         boundary: list[int] = []
         for node in self.nodes:
             if node.carries:
@@ -159,7 +168,7 @@ class Building:
 
     @cached_property
     def fixed(self) -> FixedBase:
-        """The building with these coordinates held. Raises InputError where they do not hold it."""
+        """The building with the coordinates of `boundary` fixed. Raises InputError where other parts move freely."""
         from scipy.linalg import eigh
 
         held = np.asarray(self.boundary, dtype=int)
@@ -173,22 +182,22 @@ class Building:
                 f"building.stiffness: on fixed attachments its least eigenvalue is {lowest:.3g}, so that parts move "
                 "without force; connect or remove them"
             )
-        # Of M x = K x / w^2: coordinates without mass are eigenvectors of zero, and K has an inverse.
+        # M x = K x / w^2 instead of K x = w^2 M x: K has an inverse; coordinates without mass give eigenvalues of zero.
         squares, vectors = eigh(m, k)
-        real = squares > 1e-14 * max(float(squares[-1]), 0.0)
-        order = np.flatnonzero(real)[::-1]
+        with_mass = squares > 1e-14 * max(float(squares[-1]), 0.0)
+        order = np.flatnonzero(with_mass)[::-1]
         modes = vectors[:, order] / np.sqrt(squares[order])
         follow = -np.linalg.solve(k, self.stiffness[np.ix_(inner, held)])
         return FixedBase(held, inner, follow, 1 / np.sqrt(squares[order]), modes)
 
     @property
     def frequencies(self) -> Array:
-        """Natural frequencies on fixed attachments, ascending, shape (modes,) [Hz]; without damping."""
+        """Natural frequencies of the undamped building on fixed attachments, ascending, shape (modes,) [Hz]."""
         return self.fixed.frequencies / (2 * np.pi)
 
     @cached_property
     def rigid_motions(self) -> Array:
-        """Coordinates of the six rigid motions of the whole about the origin: ndarray, shape (n, 6), [SI]."""
+        """Coordinates in the six rigid motions of the building about the origin: ndarray, shape (n, 6), [SI]."""
         motions = np.zeros((len(self.mass), FREEDOMS))
         for node in self.nodes:
             if node.carries:
@@ -198,15 +207,15 @@ class Building:
         return moved
 
     def uniform_acceleration(self, acceleration: ArrayLike) -> Array:
-        """Forces on the coordinates under which the building accelerates as one, shape (n,); acceleration [m/s^2].
+        """Forces on the coordinates under which all points of the building have one acceleration, shape (n,) [SI].
 
-        Gravity is the force of (0, 0, -g).
+        acceleration: shape (3,) [m/s^2]; (0, 0, -g) gives the forces of gravity.
         """
         forces: Array = self.mass @ self.rigid_motions[:, :3] @ np.asarray(acceleration, dtype=float)
         return forces
 
     def node(self, name: str) -> Node:
-        """The node of that name. Raises InputError: there is none."""
+        """The node of a name. Raises InputError where there is none."""
         for node in self.nodes:
             if node.name == name:
                 return node
@@ -214,27 +223,29 @@ class Building:
         raise InputError(f"node = {name!r}: the building has no such node; give one of {names}")
 
     def reduced(self, frequency: float) -> Building:
-        """The building by Craig and Bampton: its attachments, and its modes on fixed attachments up to a frequency.
+        """The building reduced by the method of Craig and Bampton. frequency: of the highest mode that is kept [Hz].
 
-        frequency [Hz]. The coordinates are those of the attachments, with the static response of the rest, and the
-        modal coordinates. Nodes and columns are those of the whole building. Raises InputError.
+        The coordinates are the coordinates of the attachments, which the rest follows statically, and amplitudes of the
+        modes on fixed attachments. All nodes and columns are kept. Raises InputError.
         """
         if not 0 < float(frequency) < _HIGHEST:
             raise InputError(f"frequency = {frequency!r}: give a number above 0 and below {_HIGHEST:g} [Hz]")
         fixed = self.fixed
-        kept = fixed.frequencies <= 2 * np.pi * frequency
-        modes = np.zeros((len(self.mass), int(kept.sum())))
-        modes[fixed.inner] = fixed.modes[:, kept]
+        low = fixed.frequencies <= 2 * np.pi * frequency
+        modes = np.zeros((len(self.mass), int(low.sum())))
+        modes[fixed.inner] = fixed.modes[:, low]
         basis = np.hstack([self._static, modes])
         nodes = tuple(Node(node.name, node.position, node.rows @ basis, node.carries) for node in self.nodes)
-        columns = tuple(Columns(one.name, one.deformation @ basis, one.inertia @ basis) for one in self.columns)
+        columns = tuple(
+            Columns(column.name, column.deformation @ basis, column.inertia @ basis) for column in self.columns
+        )
         mass, damping, stiffness = (_congruent(matrix, basis) for matrix in (self.mass, self.damping, self.stiffness))
         return Building(mass, damping, stiffness, nodes, columns)
 
     def _damped(self, ratio: float | Sequence[float], frequencies: tuple[float, float] | None) -> Building:
-        """With the damping of its modes on fixed attachments, or of Rayleigh: C = a M + b K, see `shear`.
+        """The building with damping of its modes on fixed attachments, or Rayleigh damping C = a M + b K.
 
-        M is that of the motion relative to the attachments.
+        ratio, frequencies: as of `shear`. M: of the motion relative to the attachments. Raises InputError.
         """
         ratios = np.atleast_1d(np.asarray(ratio, dtype=float))
         if ratios.ndim != 1 or not ratios.size or not np.all((ratios >= 0) & (ratios < 1)):
@@ -257,7 +268,7 @@ class Building:
         return replace(self, damping=a * rows.T @ mass @ rows + b * self.stiffness)._checked()
 
     def _checked(self) -> Building:
-        """The building, unless stiffness or damping resist a rigid motion, which only bearings may do: InputError."""
+        """The building; raises InputError where stiffness or damping resist a rigid motion, as only bearings may."""
         check_semidefinite(self.damping, "damping")
         remedies = {
             "stiffness": "leave out its supports, which the bearings are, and give the positions of the nodes",
@@ -273,7 +284,7 @@ class Building:
 
     @property
     def _static(self) -> Array:
-        """All coordinates from those of the attachments, shape (n, boundary)."""
+        """Static response of all coordinates to the coordinates of the attachments, shape (n, boundary) [SI]."""
         fixed = self.fixed
         rows = np.zeros((len(self.mass), len(fixed.boundary)))
         rows[fixed.boundary] = np.eye(len(fixed.boundary))
@@ -282,11 +293,13 @@ class Building:
 
 
 def _congruent(matrix: Array, basis: Array) -> Array:
+    """A symmetric matrix in the coordinates of a basis."""
     product: Array = basis.T @ matrix @ basis
     return (product + product.T) / 2
 
 
 def _node(name: str, indices: Sequence[int], position: ArrayLike, count: int) -> Node:
+    """A node by the indices of its six coordinates among `count`. Raises InputError."""
     path = f"building.nodes[{name!r}]"
     own = np.asarray(indices)
     if own.shape != (FREEDOMS,) or own.dtype.kind not in "iu" or len(set(own.tolist())) < FREEDOMS:
@@ -300,10 +313,11 @@ def _node(name: str, indices: Sequence[int], position: ArrayLike, count: int) ->
 
 
 class FixedBase(NamedTuple):
-    """A structure with its boundary coordinates held.
+    """A structure with fixed boundary coordinates.
 
-    inner: indices of the other coordinates. follow: their static response to the boundary, shape (inner, boundary).
-    frequencies: angular, ascending [rad/s]. modes: shape (inner, modes), of unit modal mass.
+    boundary, inner: indices of the boundary coordinates and of all others. follow: static response of the inner
+    coordinates to the boundary, shape (inner, boundary) [SI]. frequencies: circular, ascending, shape (modes,) [rad/s].
+    modes: of unit modal mass, shape (inner, modes) [SI].
     """
 
     boundary: Array
@@ -323,7 +337,7 @@ class FixedBase(NamedTuple):
 
 MOST = 5000  # coordinates of a building, whose matrices are dense
 SYMMETRY = 1e-9  # largest difference of a matrix from its transpose, relative to its largest entry
-STRAIN = 1e-6  # largest force of a rigid motion, relative to that which the same matrix exerts on single coordinates
+STRAIN = 1e-6  # largest force in a rigid motion, over the sum of the sizes of its terms
 Matrix = ArrayLike | str | PathLike[str]
 
 
@@ -359,6 +373,7 @@ def matrix_of(source: Matrix, name: str) -> Array:
 
 
 def _read(path: Path, field: str, name: str) -> Any:
+    """The array `name` of a file. field: path of the input, for messages. Raises InputError."""
     try:
         if path.suffix == ".npz":
             with np.load(BytesIO(read_input(path)), allow_pickle=False) as file:

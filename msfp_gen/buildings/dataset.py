@@ -1,4 +1,7 @@
-"""The result of a building as an xarray.Dataset, and what a netCDF-4 file of it holds: see `results/files.py`."""
+"""The result of a building as an xarray.Dataset, and as the groups and attributes of a netCDF-4 file.
+
+A result goes out to a file and comes in again by `results/files.py`.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,7 @@ if TYPE_CHECKING:
 
 Dimensions = Mapping[str, tuple[str, ...]]  # of arrays, by name
 GROUP = "building"  # group of a result file with the matrices
-MATRICES = {  # arrays there, with their dimensions
+MATRICES = {  # array in that group -> dimensions
     **dict.fromkeys(("mass", "damping", "stiffness"), ("row", "column")),
     "node_rows": ("node", "freedom", "row"),
     "node_position": ("node", "axis"),
@@ -52,7 +55,7 @@ MATRICES = {  # arrays there, with their dimensions
 
 
 def scene_text(scene: BuildingScene) -> str:
-    """Bearings, solver and names as TOML text in SI units; matrices and motion are arrays beside it."""
+    """Bearings, solver and names as TOML text in SI units; matrices and motions are stored as arrays."""
     building = scene.building
     return dumps(
         {
@@ -67,13 +70,13 @@ def scene_text(scene: BuildingScene) -> str:
             "column": [{"name": column.name} for column in building.columns],
             "bearing": [
                 {
-                    **plain_table(one),
-                    "bearing": bearing_table(one.bearing),
-                    "interface": plain_table(one.interface),
-                    "effects": None if one.effects is None else plain_table(one.effects),
+                    **plain_table(mount),
+                    "bearing": bearing_table(mount.bearing),
+                    "interface": plain_table(mount.interface),
+                    "effects": None if mount.effects is None else plain_table(mount.effects),
                     "ground": ground,
                 }
-                for one, ground in zip(scene.bearings, scene.grounds[1], strict=True)
+                for mount, ground in zip(scene.bearings, scene.grounds[1], strict=True)
             ],
         }
     )
@@ -94,17 +97,17 @@ def to_arrays(building: Building) -> Arrays:
 
 
 def ground_name(index: int) -> str:
-    """The group of a result file with a motion of the ground; the first is that of the scene."""
+    """The name of the group of a result file with a motion of the ground, by index; 0 is the motion of the scene."""
     return MOTION if index == 0 else f"{MOTION}_{index}"
 
 
 def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -> BuildingScene:
-    """The inverse of `scene_text`, with the arrays of `to_arrays` and all motions of the ground. Raises InputError."""
+    """The scene of a text of `scene_text`, arrays of `to_arrays` and all motions of the ground. Raises InputError."""
     table = toml_table(text)
-    stated_nodes = zip(table.get("node", []), arrays["node_position"], arrays["node_rows"], strict=True)
-    nodes = tuple(Node(str(row["name"]), place, rows, bool(row["carries"])) for row, place, rows in stated_nodes)
-    stated = zip(table.get("column", []), arrays["deformation"], arrays["inertia"], strict=True)
-    columns = tuple(Columns(str(row["name"]), *both) for row, *both in stated)
+    of_nodes = zip(table.get("node", []), arrays["node_position"], arrays["node_rows"], strict=True)
+    nodes = tuple(Node(str(row["name"]), position, rows, bool(row["carries"])) for row, position, rows in of_nodes)
+    of_storeys = zip(table.get("column", []), arrays["deformation"], arrays["inertia"], strict=True)
+    columns = tuple(Columns(str(row["name"]), deformation, inertia) for row, deformation, inertia in of_storeys)
     building = Building(arrays["mass"], arrays["damping"], arrays["stiffness"], nodes, columns)
     bearings = []
     for index, row in enumerate(table["bearing"]):
@@ -122,7 +125,7 @@ def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -
 EXTREMES = "extremes"  # group
 FREEDOM = ("u1", "u2", "u3", "r1", "r2", "r3")
 ON_BEARING = "on the bearing"
-MOTION_UNITS = {  # of translations, of translations and rotations
+MOTION_UNITS = {  # unit of translations; unit of translations and rotations in one array
     "displacement": ("m", "m or rad"),
     "velocity": ("m/s", "m/s or rad/s"),
     "acceleration": ("m/s^2", "m/s^2 or rad/s^2"),
@@ -134,27 +137,30 @@ OF_BEARING, VECTORS = ("time", "bearing"), ("time", "bearing", "axis")
 
 
 def _of_bearings(name: str, field: str, sign: str = "") -> Variable:
-    """A variable of one bearing alone, of all bearings."""
+    """The variable of all bearings that corresponds to a variable of one bearing."""
     variable = ONE_BEARING[name]
     return variable._replace(dims=("time", "bearing", *variable.dims[1:]), field=field, sign=sign)
 
 
 def _motions(word: str, dims: tuple[str, ...], meaning: str, kind: int = 0) -> dict[str, Variable]:
-    """Displacement, velocity and acceleration in one array. dims: of each. kind: index of the unit."""
-    whole = (*dims[:-1], "order", dims[-1])
+    """Variables for displacement, velocity and acceleration in one array.
+
+    word: field of the result. dims: of each variable. kind: index of the unit in MOTION_UNITS.
+    """
+    array_dims = (*dims[:-1], "order", dims[-1])
     return {
-        f"{word}_{name}": Variable(dims, units[kind], meaning.format(name), word, (..., order, slice(None)), whole)
+        f"{word}_{name}": Variable(dims, units[kind], meaning.format(name), word, (..., order, slice(None)), array_dims)
         for order, (name, units) in enumerate(MOTION_UNITS.items())
     }
 
 
 def _wrenches(end: int, word: str) -> dict[str, Variable]:
-    """Force and moment of an end of each bearing."""
-    whole = (*OF_BEARING, "end", "freedom")
+    """Variables for force and moment of an end of each bearing. end: 0, lower, or 1, upper."""
+    array_dims = (*OF_BEARING, "end", "freedom")
     force, moment = f"force of the {word} end", f"moment of the {word} end about it"
     return {
-        f"{word}_force": Variable(VECTORS, "N", force, "wrench", (..., end, slice(0, 3)), whole, ON_BEARING),
-        f"{word}_moment": Variable(VECTORS, "N m", moment, "wrench", (..., end, slice(3, 6)), whole, ON_BEARING),
+        f"{word}_force": Variable(VECTORS, "N", force, "wrench", (..., end, slice(0, 3)), array_dims, ON_BEARING),
+        f"{word}_moment": Variable(VECTORS, "N m", moment, "wrench", (..., end, slice(3, 6)), array_dims, ON_BEARING),
     }
 
 
@@ -163,7 +169,7 @@ COORDINATES = {
     "velocity": "their rates",
     "acceleration": "absolute",
 }
-# Of these a result is made again.
+# Variables from which a result is read again.
 STORED = {
     "time": ONE_BEARING["time"],
     **{
@@ -184,7 +190,7 @@ STORED = {
     "energy_input": Variable(ALL, "J", "work of the ground", "input"),
 }
 FORCE = "force and moment that accelerate the floors above, at half height"
-# These follow from them.
+# Variables that follow from STORED.
 DERIVED = {
     **_motions("node", ("time", "node", "freedom"), "{} of the node, absolute", 1),
     "bearing_displacement": _of_bearings("displacement", "bearing_displacement", "base less top"),
@@ -208,20 +214,20 @@ VARIABLES = STORED | DERIVED
 
 
 def arrays_of(result: Any) -> Arrays:
-    """The arrays of which the variables are parts."""
+    """Field -> array, as of `Variable.field`, of which the variables are parts."""
     nodes, bearings = result.scene.building.nodes, result.bearings
-    several = {
+    lists = {
         "node": [result.node(node.name) for node in nodes],
-        "bearing_displacement": [one.history.displacement for one in bearings],
-        "top_force": [one.history.top_force for one in bearings],
+        "bearing_displacement": [bearing.history.displacement for bearing in bearings],
+        "top_force": [bearing.history.top_force for bearing in bearings],
     }
-    fields = {variable.field for variable in VARIABLES.values()} - several.keys()
-    arrays = {name: np.stack(columns, axis=1) for name, columns in several.items()}
+    fields = {variable.field for variable in VARIABLES.values()} - lists.keys()
+    arrays = {name: np.stack(columns, axis=1) for name, columns in lists.items()}
     return arrays | {name: getattr(result, name) for name in fields}
 
 
 def to_dataset(result: Any) -> xr.Dataset:
-    """All variables along time; scene, status, notes of the monitors and versions in the attributes."""
+    """All variables over time; scene, status, notes of the monitors and versions are attributes."""
     counters = {**result.counters, "wall_time": result.wall_time}
     about = attributes_of(result, edition(), scene_text(result.scene), result.monitored, counters)
     about |= {"motion": PIECES, "padding": "NaN: the bearing has no such surface"}
@@ -230,16 +236,16 @@ def to_dataset(result: Any) -> xr.Dataset:
     return dataset_of(shown, arrays_of(result), labelled(labels_of(result.scene)), about)
 
 
-def dataset_of_one(one: Any) -> xr.Dataset:
-    """The rows of a bearing of a building, for other programs; their names are those of a bearing alone."""
-    mount = one.scene.bearings[one.index]
+def dataset_of_one(result: Any) -> xr.Dataset:
+    """The rows of a `BearingResult`, for other programs, with the names of a run of one bearing."""
+    mount = result.scene.bearings[result.index]
     parts = {"bearing": bearing_table(mount.bearing), "interface": plain_table(mount.interface)}
-    text = dumps({"axial_load": one.axial_load, **parts})
-    return dataset_of_bearing(one, attributes_of(one, "", text, one.notes, {}) | {"bearing": one.label})
+    text = dumps({"axial_load": result.axial_load, **parts})
+    return dataset_of_bearing(result, attributes_of(result, "", text, result.notes, {}) | {"bearing": result.label})
 
 
 def labels_of(scene: BuildingScene) -> Labels:
-    """The labels of the dimensions after time."""
+    """Dimension -> labels, for all dimensions but time."""
     building, bearings = scene.building, scene.bearings
     return {
         "axis": LABELS["axis"],
@@ -254,7 +260,7 @@ def labels_of(scene: BuildingScene) -> Labels:
 
 
 def columns(scene: BuildingScene) -> Places:
-    """The columns of a table of all rows, as of `column_places`; none of surfaces that a bearing does not have."""
+    """The columns of a table of all rows, as of `column_places`, without surfaces that a bearing does not have."""
     surfaces = [bearing.layout.surfaces for bearing in scene.every_bearing]
     return {
         name: (variable, index)
@@ -277,20 +283,23 @@ def _group_of(arrays: Arrays, dims: Dimensions) -> xr.Dataset:
 
 
 def _arrays_in(root: StoredGroup, name: str, dims: Dimensions, sizes: Mapping[str, int], arrays: Arrays) -> Arrays:
-    """The inverse of `_group_of`. arrays: takes them by their paths in the file."""
+    """The arrays of the group `name`, as of `_group_of`; they are added to `arrays` by their paths in the file."""
     group = root.group(name)
-    read = {key: group.array(key, tuple(sizes[dim] for dim in own)) for key, own in dims.items()}
-    arrays |= {f"{name}/{key}": values for key, values in read.items()}
-    return read
+    of_group = {key: group.array(key, tuple(sizes[dim] for dim in dims_of)) for key, dims_of in dims.items()}
+    arrays |= {f"{name}/{key}": values for key, values in of_group.items()}
+    return of_group
 
 
 def edition() -> str:
-    """A digest of the names that a file of this version has."""
+    """A digest of the names of variables and extremes in a file of this version."""
     return digest_of_names([*STORED, *DIMENSIONS])
 
 
 def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> dict[str, Any]:
-    """Scene, rows, extremes, counters and notes of a file, as `ResultFiles.fields_in`."""
+    """The fields of the `BuildingResult` in a file: scene, rows, extremes, counters and notes.
+
+    As `ResultFiles.fields_in`.
+    """
     scene = _scene(root, about, arrays)
     sizes = SIZES | {dim: len(labels) for dim, labels in labels_of(scene).items()} | {"time": root.rows("time")}
     surfaces = np.array([bearing.layout.surfaces for bearing in scene.every_bearing])
@@ -307,6 +316,7 @@ def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) ->
 
 
 def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> BuildingScene:
+    """The scene in a file. about, arrays: receive the attributes of motions and the arrays that were read."""
     text = str(about["scene"])
     table, size = toml_table(text), root.group(GROUP).rows("mass")
     sizes = {"row": size, "column": size, "freedom": FREEDOMS, "axis": 3}

@@ -1,4 +1,4 @@
-"""`msfp-gen explain`: tables of the input of a scene, of one bearing or of a building; effects with their meaning."""
+"""`msfp-gen explain`: a scene of one bearing or of a building comes in; tables that describe it go out."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from msfp_gen.scene.top import NodeTop, Top
 from msfp_gen.specification.friction_laws import Law
 from msfp_gen.specification.layout import Effects
 
-LISTED = 12  # frequencies of the frame that are listed
+LISTED = 12  # frequencies of the building in its table, at most
 SURFACE_COLUMNS = {
     "R [mm]": ("radius", 1e3),
     "capacity [mm]": ("capacity", 1e3),
@@ -48,7 +48,7 @@ BODY_COLUMNS = {
     "rim radius [mm]": ("rim_radius", 1e3),
     "rim offset [mm]": ("rim_offset", 1e3),
 }
-# Units of the numbers that describe the origin of a motion (`Motion.metadata`); the others have none.
+# Number in `Motion.metadata`, which describes the origin of a motion -> unit; other numbers have no unit.
 MOTION_UNITS = {
     "amplitude": "m", "period": "s", "lead_in": "s", "acceleration": "m/s^2", "initial_speed": "m/s",
     "start_time": "s", "window_start": "s", "end_offset": "m",
@@ -66,7 +66,7 @@ TOPS = {
 
 
 def explain(scene: AnyScene) -> list[Table]:
-    """Tables that describe a scene: bearings, motions, what stands on them, effects with their meaning, solver."""
+    """Tables that describe a scene: bearings, motions, top or building, effects with their meaning, solver."""
     if isinstance(scene, BuildingScene):
         return [
             frame_table(scene),
@@ -96,19 +96,19 @@ def explain(scene: AnyScene) -> list[Table]:
 
 def frame_table(scene: BuildingScene) -> Table:
     """Mass, coordinates, nodes and frequencies of the building."""
-    building, shown = scene.building, scene.building.frequencies[:LISTED]
+    building, listed = scene.building, scene.building.frequencies[:LISTED]
     more = f", ... of {len(building.frequencies)}" if len(building.frequencies) > LISTED else ""
     rows = [
         ("weight", f"{scene.weight * 1e-6:.5g} MN at g = {scene.gravity:g} m/s^2"),
         ("coordinates", str(len(building.mass))),
         ("nodes", ", ".join(f"{node.name} ({vector(node.position)} m)" for node in building.nodes)),
-        ("frequencies on fixed attachments", f"{vector(shown)}{more} Hz" if len(shown) else "none: a rigid body"),
+        ("frequencies on fixed attachments", f"{vector(listed)}{more} Hz" if len(listed) else "none: a rigid body"),
     ]
     return Table("building", (), rows)
 
 
 def bearing_table(scene: BuildingScene) -> Table:
-    """The bearings: kind, place, load at rest."""
+    """Kind, position and load at rest of every bearing."""
     kinds = grouped(scene.every_bearing)
     kind_of = {index: str(number) for number, members in enumerate(kinds, start=1) for index in members}
     rows = [
@@ -128,14 +128,17 @@ def bearing_table(scene: BuildingScene) -> Table:
 
 
 def effect_tables(scene: BuildingScene) -> Iterator[Table]:
-    """The effects of each bearing, those with the same ones together; loads that decide are the least of them."""
+    """The effects of the bearings; bearings of one kind with equal effects have one table.
+
+    The reasons are of the bearing that keeps the least share of its load at rest.
+    """
     remaining = remaining_loads(scene)
     keys = (
-        (selection.effects, tuple((reason.effect, reason.chosen) for reason in selection.reasons), one.bearing)
-        for selection, one in zip(scene.effect_selections, scene.bearings, strict=True)
+        (selection.effects, tuple((reason.effect, reason.chosen) for reason in selection.reasons), mount.bearing)
+        for selection, mount in zip(scene.effect_selections, scene.bearings, strict=True)
     )
     for members in grouped(keys):
-        decisive = min(members, key=lambda index: float(remaining[index]))  # keeps the least of its load
+        decisive = min(members, key=lambda index: float(remaining[index]))
         selection = scene.effect_selections[decisive]
         table = effect_table(selection)
         yield Table(f"{_numbers(members, len(scene.bearings))}: {table.title}", (), table.rows)
@@ -143,7 +146,7 @@ def effect_tables(scene: BuildingScene) -> Iterator[Table]:
 
 
 def grouped(keys: Iterable[Hashable]) -> list[list[int]]:
-    """Indices of equal keys together, in the order of the first of each."""
+    """Groups of indices of equal keys, in the order of the first index of each group."""
     groups: dict[Hashable, list[int]] = {}
     for index, key in enumerate(keys):
         groups.setdefault(key, []).append(index)
@@ -151,6 +154,7 @@ def grouped(keys: Iterable[Hashable]) -> list[list[int]]:
 
 
 def _kinds(scene: BuildingScene) -> Iterator[Table]:
+    """Surfaces, doubtful values and bodies of every kind of bearing."""
     for number, members in enumerate(grouped(scene.every_bearing), start=1):
         bearing, where = scene.bearings[members[0]].bearing, _numbers(members, len(scene.bearings))
         doubts = doubt_tables(doubtful_values(bearing))
@@ -159,13 +163,14 @@ def _kinds(scene: BuildingScene) -> Iterator[Table]:
 
 
 def _interfaces(scene: BuildingScene) -> Iterator[Table]:
-    for members in grouped(one.interface for one in scene.bearings):
+    """The different interfaces, each with the numbers of its bearings."""
+    for members in grouped(mount.interface for mount in scene.bearings):
         where = _numbers(members, len(scene.bearings))
         yield top_table(scene.bearings[members[0]].interface, f"interface to the building, {where}")
 
 
 def _doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
-    """Doubts about the interfaces; those of bearings stand with their kinds."""
+    """Doubts about interfaces and building; `_kinds` has the doubts about bearings."""
     for index, (mount, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True)):
         stiffness, needed, _ = standing_below(mount, load)
         yield from unsteady(f"{scene.label(index)}: interface.rotational_stiffness", stiffness, needed)
@@ -173,7 +178,7 @@ def _doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
 
 
 def surface_table(bearing: Bearing) -> Table:
-    """Surfaces of a bearing."""
+    """Table of the surfaces of a bearing."""
     layout, shapes = bearing.layout, {1: "up", -1: "down"}
     rows = [
         [str(number), shapes[sign], *_cells(surface, SURFACE_COLUMNS)]
@@ -192,14 +197,14 @@ def surface_table(bearing: Bearing) -> Table:
 
 
 def doubt_tables(doubts: Iterable[tuple[int, float, str]]) -> Iterator[Table]:
-    """Values that are hardly meant, as of `effect_selection.doubtful_values`; no table without them."""
+    """A table of doubtful values, as of `effect_selection.doubtful_values`; none without any."""
     rows = [(text,) for _, _, text in doubts]
     if rows:
         yield Table("values that are hardly meant", ("value",), rows)
 
 
 def body_table(bearing: Bearing) -> Table:
-    """Moving bodies of a bearing."""
+    """Table of the moving bodies of a bearing."""
     rows = [(str(number), *_cells(body, BODY_COLUMNS)) for number, body in enumerate(bearing.bodies, start=2)]
     return Table("moving bodies, bottom first", ("body", *BODY_COLUMNS), rows)
 
@@ -209,7 +214,7 @@ def _cells(part: object, columns: dict[str, tuple[str, float]]) -> Iterator[str]
 
 
 def motion_table(motion: Motion) -> Table:
-    """Peaks and origin of a motion of the ground."""
+    """Table of the peaks and the origin of a motion of the ground."""
     t = np.union1d(motion.knots, np.linspace(0, motion.duration, 4001))
     peaks = [np.abs(of(t)).max(axis=0) for of in (motion.displacement, motion.velocity, motion.acceleration)]
     sources = [
@@ -232,7 +237,7 @@ def motion_table(motion: Motion) -> Table:
 
 
 def top_table(top: Top | NodeTop, title: str) -> Table:
-    """Stiffness, damping, mass and load of a top, or of the interface to a building."""
+    """Table of stiffness, damping, mass and load of a top, or of the interface to a building."""
     rows = [
         (name.replace("_", " "), "rigid" if value is None else f"{_value(value)} {rule.unit}")
         for name, rule, _ in ruled_fields(type(top))
@@ -243,7 +248,7 @@ def top_table(top: Top | NodeTop, title: str) -> Table:
 
 
 def effect_table(selection: EffectSelection) -> Table:
-    """The effects and their meaning; of each selected effect also the reason and what the selection saves."""
+    """Table of the effects with their meaning; with the reason and the saving of each selected effect."""
     effects = selection.effects
     reasons = {reason.effect: reason for reason in selection.reasons}
     rows = []
@@ -265,7 +270,7 @@ def effect_table(selection: EffectSelection) -> Table:
 
 
 def _history(title: str, history: Prescribed | None) -> list[Table]:
-    """Ranges of the channels of a load or rotation history."""
+    """Table of the ranges of the channels of a load or rotation history; none without a history."""
     if history is None:
         return []
     values = history.evaluate(np.union1d(history.knots, np.linspace(0, history.duration, 2001)))
@@ -278,18 +283,18 @@ def _history(title: str, history: Prescribed | None) -> list[Table]:
 
 
 def friction_tables(law: Law | None, bearing: Bearing) -> list[Table]:
-    """Parameters of the friction law on each surface, defaults included."""
+    """Table of the parameters of the friction law on each surface, defaults included; none without a law."""
     if law is None:
         return []
     rows = [law_parameters(law, bearing, index) for index in range(len(bearing.surfaces))]
     units = {name: rule.unit for name, rule, _ in ruled_fields(Surface) if isinstance(rule, Quantity)}
     names = {name: f"{name} [{units[name]}]" if units[name] else name for name in law.parameters}
-    lines = [(shown, *(f"{row[name]:.4g}" for row in rows)) for name, shown in names.items()]
+    lines = [(label, *(f"{row[name]:.4g}" for row in rows)) for name, label in names.items()]
     return [Table("friction law, surfaces bottom first", ("", *map(str, range(1, len(rows) + 1))), lines)]
 
 
 def _limits(limits: Limits | None) -> Iterator[Table]:
-    """The limits of the device that the scene gives, with the defaults of the others that have a number."""
+    """Table of the limits of the device, given or by default; none where the scene gives no limits."""
     if limits is not None:
         units = {name: rule.unit for name, rule, _ in ruled_fields(Limits) if isinstance(rule, Quantity)}
         values = {name: getattr(limits, name) for name in units}
@@ -298,16 +303,17 @@ def _limits(limits: Limits | None) -> Iterator[Table]:
 
 
 def _solver(scene: AnyScene) -> Table:
-    solver, alone, method = scene.solver, list[tuple[str, str]](), "building and bearings together"
+    """Table of the options of the solver and of the end of the run."""
+    solver, of_bearing, method = scene.solver, list[tuple[str, str]](), "building and bearings together"
     if isinstance(scene, Scene):
         method = METHODS[solver.method]
-        alone = [("steps", _steps(scene)), ("tolerance of angles", f"{solver.angle_tolerance:g} rad")]
-        alone.append(("start", "centred, at rest" if scene.initial_state is None else "given"))
+        of_bearing = [("steps", _steps(scene)), ("tolerance of angles", f"{solver.angle_tolerance:g} rad")]
+        of_bearing.append(("start", "centred, at rest" if scene.initial_state is None else "given"))
     step = scene.output_step if isinstance(scene, Scene) else scene.row_step
     rows = [
         ("method", f"{solver.method}: {method}"),
         ("rtol", f"{solver.rtol:g}, relative error of a step"),
-        *alone,
+        *of_bearing,
         ("longest step", "resolution of the motion" if solver.max_step is None else f"{solver.max_step:g} s"),
         ("rows", "every step" if step is None else f"every {step:g} s"),
         ("ends at", " or ".join([f"{scene.end:.6g} s", *_stops(scene)])),
@@ -316,7 +322,7 @@ def _solver(scene: AnyScene) -> Table:
 
 
 def _stops(scene: AnyScene) -> Iterator[str]:
-    """What ends a run before its time."""
+    """The stop conditions of a scene, as text."""
     stop = scene.stop if isinstance(scene, Scene) else None
     if stop is not None and stop.displacement is not None:
         yield f"{stop.displacement * 1e3:.4g} mm across the bearing"
@@ -340,7 +346,7 @@ def _value(value: object) -> str:
 
 
 def _numbers(members: Iterable[int], count: int) -> str:
-    """Numbers of bearings in words: ranges together."""
+    """Numbers of bearings as text, with ranges. members: indices from 0. count: of all bearings."""
     numbers = np.array(sorted(members)) + 1
     if len(numbers) == count:
         return "all bearings" if count > 1 else "the bearing"

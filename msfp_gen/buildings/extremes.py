@@ -1,4 +1,7 @@
-"""Extremes of a building over all steps of its run, which do not depend on the times of the rows."""
+"""Extremes of a building over all steps of its run, whatever the times of the rows.
+
+The scene gives the vectors of which the compiled run keeps peaks; its numbers become `BuildingExtremes`.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +16,12 @@ from msfp_gen.common.arrays import Array, parts
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.friction_parameters import start_temperatures
 
-Shapes = list[tuple[str, tuple[int, ...]]]  # names and shapes of numbers that lie one after the other
+Shapes = list[tuple[str, tuple[int, ...]]]  # names and shapes of consecutive numbers
 CORNERS = 4  # of the plan
-OF_SURFACES = ("sliding", "rim_force", "lift", "temperature")  # of which the largest value counts
-CONTACT = ("contact_offset", "contact_time")  # of which rows know nothing
-VECTOR = 4  # numbers of a vector: largest magnitudes along E1, E2, E3 and in the horizontal plane
-# The sizes of dimensions that are the same of all buildings.
+OF_SURFACES = ("sliding", "rim_force", "lift", "temperature")  # quantities of surfaces whose largest value is kept
+CONTACT = ("contact_offset", "contact_time")  # quantities of surfaces that rows do not have
+VECTOR = 4  # numbers for a vector: largest magnitudes along E1, E2, E3 and in the horizontal plane
+# Dimension -> size, where it is equal in all buildings.
 SIZES = {"peak": VECTOR, "whole": 1, "kind": 2, "end": 2, "order": 3}
 # Arrays with their dimensions in a file.
 Peaks = Annotated[Array, ("peak",)]
@@ -33,16 +36,20 @@ OfSurfaces = Annotated[Array, ("bearing", "surface")]
 class BuildingExtremes:
     """Extremes of the run of a building.
 
-    Of vectors, shape (..., 4), the largest magnitude along E1, E2, E3 and in the horizontal plane: node_acceleration
-    [m/s^2]; node_displacement, relative to the ground, drift of the storeys at their stiffness centre, corner_drift at
-    that corner of the plan where it is largest, and mean_displacement of the bearings [m]; overturning_moment, about E1
-    and E2 [N m]; storey_shear, base_reaction and top_force of the bearings [N]; bearing_displacement, base less top
-    [m]. Largest magnitudes: storey_torsion, shape (storeys,), base_torsion, shape (1,) [N m]; base_twist, shape (1,)
-    [rad]; energy: kinetic and strain energy, shape (2,) [J]. Least and largest value: axial_force, shape (bearings, 2)
-    [N]; normal_force, shape (bearings, 2, surfaces) [N]. Largest, shape (bearings, surfaces): sliding [m], rim_force
-    [N], lift, the clearance between separated faces [m], temperature [degC], and contact_offset, of a loaded contact
-    from the axis of its slider [m], at contact_time [s], in models without uplift. A bearing with fewer surfaces than
-    another has zeros in the place of the others.
+    Vectors, shape (..., 4), with the largest magnitudes along E1, E2, E3 and in the horizontal plane: node_acceleration
+    [m/s^2]; node_displacement, relative to the ground, drift of the storeys at the stiffness centre, corner_drift at
+    the corner of the plan with the largest drift, and mean_displacement of the bearings [m]; overturning_moment, about
+    E1 and E2 [N m]; storey_shear, base_reaction and top_force of the bearings [N]; bearing_displacement, base less top
+    [m].
+
+    Largest magnitudes: storey_torsion, shape (storeys,), base_torsion, shape (1,) [N m]; base_twist, shape (1,) [rad];
+    energy: kinetic and strain energy, shape (2,) [J].
+
+    Least and largest value: axial_force, shape (bearings, 2) [N]; normal_force, shape (bearings, 2, surfaces) [N].
+
+    Largest value, shape (bearings, surfaces): sliding [m], rim_force [N], lift, the clearance between separated faces
+    [m], temperature [degC], and, in models without uplift, contact_offset of a loaded contact from the axis of its
+    slider [m], at contact_time [s]. Bearings with fewer surfaces than another have zeros in place of the missing ones.
     """
 
     node_acceleration: OfNodes
@@ -70,7 +77,7 @@ class BuildingExtremes:
 
     @classmethod
     def of_run(cls, scene: BuildingScene, recorded: Array, kept: Sequence[Shapes]) -> BuildingExtremes:
-        """Extremes that the compiled run recorded (`msfp_building.h`). kept: numbers of the rows of each bearing."""
+        """Extremes from the numbers of a compiled run (`msfp_building.h`). kept: names and shapes for each bearing."""
         nodes, storeys = len(scene.building.nodes), len(scene.building.columns)
         vectors = {
             "node_acceleration": nodes,
@@ -129,37 +136,37 @@ DIMENSIONS = {
 def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:
     """The vectors of a building of which the compiled run keeps peaks, in the order of `BuildingExtremes.of_run`.
 
-    The order of the derivative of the coordinates that each is of; its rows, shape (vectors, 3, n) [SI]; the shares of
-    the motions of the ground that are taken off it, shape (vectors, grounds) [-].
+    A vector is its rows times a derivative of the coordinates, less shares of the motions of the ground. Returns the
+    orders of the derivatives; the rows, shape (vectors, 3, n) [SI]; and the shares, shape (vectors, grounds) [-].
     """
     building, size = scene.building, len(scene.building.mass)
     grounds, ground_of = scene.grounds
-    still = np.zeros(len(grounds))
-    common, mean = still.copy(), np.bincount(ground_of, minlength=len(grounds)) / len(ground_of)
-    common[0] = 1.0
-    about = np.zeros((3, size))
+    none = np.zeros(len(grounds))
+    first, mean = none.copy(), np.bincount(ground_of, minlength=len(grounds)) / len(ground_of)
+    first[0] = 1.0
+    zeros = np.zeros((3, size))
 
-    def turned(row: Array) -> Array:
-        return np.vstack([about[:2], row])
+    def about_e3(row: Array) -> Array:
+        return np.vstack([zeros[:2], row])
 
-    entries = [(2, node.rows[:3], still) for node in building.nodes]
-    entries += [(0, node.rows[:3], common) for node in building.nodes]
-    entries += [(0, columns.deformation[:3], still) for columns in building.columns]
-    entries += [(2, columns.inertia[:3], still) for columns in building.columns]
-    entries += [(2, turned(columns.inertia[5]), still) for columns in building.columns]
-    entries.append((0, turned(building.node(scene.bearings[0].node).rows[5]), still))
+    entries = [(2, node.rows[:3], none) for node in building.nodes]
+    entries += [(0, node.rows[:3], first) for node in building.nodes]
+    entries += [(0, columns.deformation[:3], none) for columns in building.columns]
+    entries += [(2, columns.inertia[:3], none) for columns in building.columns]
+    entries += [(2, about_e3(columns.inertia[5]), none) for columns in building.columns]
+    entries.append((0, about_e3(building.node(scene.bearings[0].node).rows[5]), none))
     entries.append((0, scene.attachments[:, :3].mean(axis=0), mean))
-    entries.append((2, np.vstack([overturning(scene), about[:1]]), still))
-    entries += [(0, rows, still) for rows in corners(scene).reshape(-1, 3, size)]
+    entries.append((2, np.vstack([overturning(scene), zeros[:1]]), none))
+    entries += [(0, rows, none) for rows in corners(scene).reshape(-1, 3, size)]
     orders, rows, shares = zip(*entries, strict=True)
     return list(orders), np.stack(rows), np.stack(shares)
 
 
 def overturning(scene: BuildingScene) -> Array:
-    """Moment that accelerates the building, about E1 and E2 through its centre of mass in plan, at height 0.
+    """Rows of the overturning moment about E1 and E2, shape (2, n) [SI], to be multiplied by the accelerations.
 
-    Rows of the accelerations, shape (2, n) [SI]. The bearings provide it, by horizontal forces at their height and by
-    axial forces beyond those at rest.
+    The moment accelerates the building; it is about its centre of mass in plan, at height 0. The bearings provide it,
+    by horizontal forces at their height and by axial forces beyond the loads at rest.
     """
     force = (scene.building.mass @ scene.building.rigid_motions).T
     x, y = scene.mass_centre
@@ -167,7 +174,7 @@ def overturning(scene: BuildingScene) -> Array:
 
 
 def corners(scene: BuildingScene) -> Array:
-    """Drift of each storey at the corners of the rectangle around the bearings: rows, shape (storeys, 4, 3, n) [SI]."""
+    """Rows of the drift of each storey at the corners of the rectangle around the bearings, (storeys, 4, 3, n) [SI]."""
     nodes, size = scene.building.nodes, len(scene.building.mass)
     (west, south), (east, north) = scene.places.min(axis=0), scene.places.max(axis=0)
     rows = [
@@ -180,7 +187,7 @@ def corners(scene: BuildingScene) -> Array:
 
 
 def lift_of(compression: Array) -> Array:
-    """Clearance between separated faces, of the compression of unilateral contacts, shape (..., surfaces) [m]."""
+    """Clearance between separated faces from the compression of unilateral contacts, shape (..., surfaces) [m]."""
     opening: Array = np.maximum(0.0, -compression) + 0.0  # no -0.0
     return opening
 
@@ -188,20 +195,20 @@ def lift_of(compression: Array) -> Array:
 def temperature_of(bearing: Bearing, recorded: Array) -> Array:
     """Temperatures at the centres of surfaces, shape (..., surfaces) [degC].
 
-    recorded: 0 where the model has none; the surface is then as at the start.
+    recorded: of the run; 0 where the model has no temperature, which is then the temperature at the start.
     """
     return np.where(recorded == 0.0, start_temperatures(bearing), recorded)
 
 
 def heated(bearing: Bearing, temperature: Array) -> Array | None:
-    """The temperatures of surfaces, shape (..., surfaces) [degC]; None where none of them was heated."""
+    """The temperatures of surfaces, shape (..., surfaces) [degC]; None where no surface was heated."""
     return temperature if (temperature > start_temperatures(bearing)).any() else None
 
 
 def padded(columns: Sequence[Array], fill: float = 0.0) -> Array:
-    """Values of the surfaces of all bearings, shape (..., surfaces) each: (..., bearings, most surfaces).
+    """Values of all bearings in one array, shape (..., bearings, most surfaces) [unit of `columns`].
 
-    In the [unit of `columns`]. fill: where a bearing has no such surface.
+    columns: of each bearing, shape (..., surfaces). fill: value where a bearing has no such surface.
     """
     most = max(values.shape[-1] for values in columns)
     table = np.full((*columns[0].shape[:-1], len(columns), most), fill)

@@ -1,6 +1,6 @@
-"""`load_scene`: the scene of a file or preset, of one bearing or of a building; tables of buildings as in files.
+"""`load_scene`: a file, a preset or a table comes in; the scene of one bearing or of a building goes out.
 
-Cheaper models of a building are made from its scene (docs/fidelity.md).
+Cheaper models of the scene of a building are made here too (docs/fidelity.md).
 """
 
 from __future__ import annotations
@@ -44,10 +44,11 @@ Table = dict[str, Any]
 
 @dataclass(frozen=True)
 class FrameTable:
-    """`[building]` beside its tables.
+    """The plain keys of the table `[building]`.
 
     mass, stiffness, damping: files of matrices, as of `Building.from_matrices`, in place of base and storeys.
-    damping_ratio, rayleigh_frequencies [Hz]: as in `Building.shear`. highest_frequency [Hz]: as in `Building.reduced`.
+    damping_ratio, rayleigh_frequencies [Hz]: as in `Building.shear`. highest_frequency: as `frequency` of
+    `Building.reduced` [Hz].
     """
 
     mass: Annotated[str | None, Paths()] = None
@@ -60,7 +61,7 @@ class FrameTable:
 
 @dataclass(frozen=True)
 class NodeTable:
-    """`[[building.node]]`: indices of the six coordinates of a node from 0, and its position [m]."""
+    """The table `[[building.node]]`. coordinates: indices of the six coordinates of the node, from 0."""
 
     name: str
     coordinates: Annotated[tuple[int, ...], Quantity("", least=0, whole=True, shape=(6,))]
@@ -96,15 +97,15 @@ SCENE = model_of(
 )
 _buildings: Kept[Building] = Kept(256 << 20, lambda building: 3 * building.mass.nbytes)
 MATRICES = paths_in(FrameTable)
-FILES = {"motion": paths_in(*KINDS.values()), "building": MATRICES}  # table -> its keys that are paths of files
+FILES = {"motion": paths_in(*KINDS.values()), "building": MATRICES}  # table -> its keys that are paths of files  # table -> keys that are paths of files
 
 
 def building_from_table(
     table: Mapping[str, Any], folder: Path | None = None, motion: Motion | None = None
 ) -> BuildingScene | Scene:
-    """The building of a plain table, as in a file; folder, motion: as in `scene_from_table`. Raises InputError.
+    """The scene of a building from a plain table, as in a file; a `Scene` with fidelity = "equivalent".
 
-    A `Scene` where the table has fidelity = "equivalent".
+    folder, motion: as in `scene_from_table`. Raises InputError.
     """
     parts, _ = scene_parts(SCENE, table, folder, motion)
     frame, named = parts.pop("building"), parts.pop("bearings", {})
@@ -120,7 +121,7 @@ def building_from_table(
 
 
 def _building(table: Table, folder: Path | None) -> Building:
-    """The building, made once for each frame and contents of its matrices, as long as it is among the last ones."""
+    """The building of the table `[building]`; a cache has the last buildings, by their frame or matrices."""
     frame = {name: value for name, value in table.items() if name not in (*COMMON, "bearing")}
     named = [name for name in MATRICES if name in frame]
     frame |= {name: resolved(frame[name], folder, f"building.{name}") for name in named}
@@ -168,16 +169,17 @@ def _of_matrices(table: Table, options: Table) -> Building:
 
 
 def stored_bearing(row: Table, index: int) -> BuildingBearing:
-    """A bearing of the table of a result file, complete and in SI units. Raises InputError."""
+    """A bearing from a complete table of a result file, in SI units. Raises InputError."""
     path = f"bearing[{index}]"
     return _bearing(validate(_BEARING, row), path, {}, None, {})
 
 
 def _bearing(row: Table, path: str, named: Table, folder: Path | None, bearings: dict[str, Bearing]) -> BuildingBearing:
+    """A bearing from the table `[[building.bearing]]` at `path`. named, bearings: as of `_bearing_values`."""
     values = dict(row)
     if "interface" not in values:
         raise InputError(f"{path}.interface is missing: give this table, or [building.interface] for all bearings")
-    values["bearing"] = _values(values["bearing"], path, named, bearings)
+    values["bearing"] = _bearing_values(values["bearing"], path, named, bearings)
     with errors_at("effects", f"{path}.effects"):
         if "effects" in values:
             values["effects"] = effects_from_table(values["effects"])
@@ -193,16 +195,20 @@ def _bearing(row: Table, path: str, named: Table, folder: Path | None, bearings:
         return BuildingBearing(**values)
 
 
-def _values(source: Any, path: str, named: Table, bearings: dict[str, Bearing]) -> Bearing:
-    """A bearing by its name in `[bearings]`, by that of a preset, or as a table. bearings: the named ones so far."""
-    own = isinstance(source, str) and source in named
+def _bearing_values(source: Any, path: str, named: Table, bearings: dict[str, Bearing]) -> Bearing:
+    """The values of a bearing. source: name in `[bearings]` or of a preset, or a table. Raises InputError.
+
+    named: the table `[bearings]`. bearings: name -> values that are read already; receives further ones.
+    """
+    in_file = isinstance(source, str) and source in named
     if isinstance(source, str) and source in bearings:
         return bearings[source]
-    place = f"bearings.{source}" if own else f"{path}.bearing"
+    place = f"bearings.{source}" if in_file else f"{path}.bearing"
     try:
-        bearing = bearing_from_table(named[source] if own else source)
+        bearing = bearing_from_table(named[source] if in_file else source)
     except InputError as error:
-        names = f"; those of [bearings] are {', '.join(named)}" if isinstance(source, str) and not own and named else ""
+        others = isinstance(source, str) and not in_file and named
+        names = f"; those of [bearings] are {', '.join(named)}" if others else ""
         raise InputError(place + str(error).removeprefix("bearing") + names) from None
     if isinstance(source, str):
         bearings[source] = bearing
@@ -213,7 +219,7 @@ AnyScene = Scene | BuildingScene
 
 
 def load_scene(source: str | Path) -> AnyScene:
-    """The scene in a TOML file, or the preset of that name. Paths inside a file are relative to it.
+    """The scene in a TOML file, or the preset of a name. Paths inside a file are relative to the file.
 
     A file with a table `[building]` gives a `BuildingScene`. Raises InputError of one line that names the file, the
     path of the field, the value and the remedy.
@@ -233,7 +239,7 @@ def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> AnyScene:
     """The scene of `load_scene(source)` with some fields changed.
 
     changes: path of a field, such as `motion.scale`, `bearing.surfaces[0].friction` or
-    `building.bearing[*].bearing.friction` -> value. Raises InputError as `load_scene` does.
+    `building.bearing[*].bearing.friction`, -> value. Raises InputError as `load_scene` does.
     """
     table, path = scene_table(source)
     try:
@@ -250,7 +256,7 @@ def scene_of(table: Mapping[str, Any], folder: Path | None = None, **parts: Any)
 
 
 def reduced(scene: AnyScene, word: str) -> AnyScene:
-    """The scene at a level of fidelity. Raises InputError: an unknown one, or one that it does not have."""
+    """The scene at a level of fidelity. Raises InputError: an unknown level, or a level that the scene cannot have."""
     if not isinstance(word, str) or word not in FIDELITIES:
         raise InputError(f"fidelity = {word!r}: give one of {', '.join(map(repr, FIDELITIES))}")
     return at_fidelity(scene, word) if isinstance(scene, Scene) else building_at_fidelity(scene, word)
@@ -259,7 +265,7 @@ def reduced(scene: AnyScene, word: str) -> AnyScene:
 def building_at_fidelity(scene: BuildingScene, word: str) -> BuildingScene | Scene:
     """The scene at a level of fidelity: "exact" (as it is), "backbone", "loose", "massless", "rigid", or "equivalent".
 
-    The last is the scene of one bearing that carries the whole building. Raises InputError of one line.
+    "equivalent" gives the scene of one bearing that carries the whole building. Raises InputError of one line.
     """
     if word in ("exact", "backbone"):
         return labelled(scene, word)
@@ -268,23 +274,23 @@ def building_at_fidelity(scene: BuildingScene, word: str) -> BuildingScene | Sce
     if word == "loose" and scene.solver.rtol >= LOOSE:
         raise InputError(f"fidelity = 'loose': solver.rtol = {scene.solver.rtol:g} already; give less than {LOOSE:g}")
     bearings = scene.bearings if word == "loose" else [
-        replace(one, effects=replace(effects, sliders="massless", uplift=False))
-        for one, effects in zip(scene.bearings, scene.modelled, strict=True)
+        replace(mount, effects=replace(effects, sliders="massless", uplift=False))
+        for mount, effects in zip(scene.bearings, scene.modelled, strict=True)
     ]  # fmt: skip
     building = rigid_building(scene.building) if word == "rigid" else scene.building
     return replace(scene, building=building, bearings=bearings, solver=implicit_solver(scene.solver), fidelity=word)
 
 
 def rigid_building(building: Building) -> Building:
-    """The building as one rigid body: its coordinates are the six rigid motions; nodes stay, columns do not."""
+    """The building as one rigid body with its nodes and without columns; its coordinates are the six rigid motions."""
     motions = building.rigid_motions
-    none = np.zeros((6, 6))
+    zeros = np.zeros((6, 6))
     nodes = tuple(replace(node, rows=node.rows @ motions) for node in building.nodes)
-    return Building(motions.T @ building.mass @ motions, none, none, nodes)
+    return Building(motions.T @ building.mass @ motions, zeros, zeros, nodes)
 
 
 def check_one_ground(scene: BuildingScene, word: str) -> None:
-    """Raise InputError where the ground moves differently below some bearings, for a model that has one motion."""
+    """Raise InputError where bearings have different motions of the ground. word: fidelity with one motion only."""
     if len(set(scene.grounds[1])) > 1:
         raise InputError(
             f"fidelity = {word!r}: it has one motion of the ground, and bearings have motions of their own; give "
@@ -293,17 +299,18 @@ def check_one_ground(scene: BuildingScene, word: str) -> None:
 
 
 def load_shares(scene: BuildingScene) -> list[float]:
-    """The share of the weight that each bearing carries at rest."""
+    """The share of the weight that each bearing carries at rest [-]."""
     shares: list[float] = (scene.axial_loads / scene.axial_loads.sum()).tolist()
     return shares
 
 
 def _equivalent(scene: BuildingScene) -> Scene:
+    """The scene of the equivalent pendulum of all bearings, which carries the building as a mass."""
     check_one_ground(scene, "equivalent")
     bearing = equivalent_pendulum(scene.every_bearing, load_shares(scene))
     mass = float(scene.axial_loads.sum()) / scene.gravity
     springs = [
-        float(sum(getattr(one.interface, name) for one in scene.bearings))
+        float(sum(getattr(mount.interface, name) for mount in scene.bearings))
         for name in ("vertical_stiffness", "vertical_damping")
     ]
     top = Top.mass(
@@ -322,7 +329,7 @@ def with_absolute_paths(table: Mapping[str, Any], folder: Path | None) -> dict[s
     absolute = deepcopy(dict(table))
     for place, inner, names in _with_files(absolute):
         for name in names:
-            if name in inner and _are_texts(inner[name]):  # the schema refuses others
+            if name in inner and _are_texts(inner[name]):  # the schema refuses other values
                 inner[name] = resolved(inner[name], folder, f"{place}.{name}")
         if isinstance(inner.get("scale_to"), dict):
             inner["scale_to"] = with_spectrum(inner["scale_to"], folder, f"{place}.scale_to")
@@ -330,7 +337,7 @@ def with_absolute_paths(table: Mapping[str, Any], folder: Path | None) -> dict[s
 
 
 def located_value(path: str, value: Any, folder: Path | None) -> Any:
-    """A value for a path of a scene with absolute paths of its files; `folder`, errors: as of `with_absolute_paths`."""
+    """A value of the field `path` with absolute paths of files; folder, errors: as of `with_absolute_paths`."""
     keys = keys_of(path)
     nested: Any = value
     for key in reversed(keys):
@@ -346,7 +353,7 @@ def _are_texts(value: Any) -> bool:
 
 
 def _with_files(table: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any], tuple[str, ...]]]:
-    """Place, table and keys of every table that may name files; the motions of single bearings are the last."""
+    """Path, table and keys of every table that may name files; the motions of single bearings are the last."""
     yield from ((part, table[part], names) for part, names in FILES.items() if isinstance(table.get(part), dict))
     frame = table.get("building")
     rows = frame.get("bearing") if isinstance(frame, dict) else None

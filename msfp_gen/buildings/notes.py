@@ -1,4 +1,4 @@
-"""The notes of a building: values that are hardly meant, its energy balance, those of the monitors of its bearings."""
+"""The notes on the run of a building: doubtful values of the scene, the energy balance, and notes of the monitors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.standing import unsteady
 
 ENERGY_LIMIT = 0.02  # error of the energy balance of the building over its largest term, above which a note is written
-GATHERED = ("inertia", "heat", "law_speed", "law_load", "law_temperature")  # kinds
+GATHERED = ("inertia", "heat", "law_speed", "law_load", "law_temperature")  # kinds with one note for all bearings
 ENERGY = (
     "the energy balance of the building has an error of {value:.1%} of the largest energy: give a smaller "
     "solver.max_step"
@@ -26,14 +26,15 @@ ENERGY = (
 
 
 def notes_of(scene: BuildingScene, monitored: Sequence[Note], error: float, time: float) -> tuple[Note, ...]:
-    """The notes of a run in order of time. The text of each begins with the bearing that it is about.
+    """The notes of a run in order of time; a note about a bearing begins with the label of the bearing.
 
-    monitored: of the monitors of the bearings. error: of the energy balance [-]; time: at which it is largest [s].
+    monitored: notes of the monitors of the bearings. error: largest error of the energy balance [-]. time: of this
+    error [s].
     """
     values = [
         replace(note, bearing=number)
-        for number, (one, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True), start=1)
-        for note in value_notes(one, load)
+        for number, (mount, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True), start=1)
+        for note in value_notes(mount, load)
     ]
     notes = [*values, *_gathered(monitored)]
     labelled = [replace(note, text=f"{scene.label(note.bearing - 1)}: {note.text}") for note in notes]
@@ -45,9 +46,9 @@ def notes_of(scene: BuildingScene, monitored: Sequence[Note], error: float, time
 
 
 def _gathered(notes: Sequence[Note]) -> list[Note]:
-    """The notes; of those about friction and inertia, which many bearings get, one of each kind stands for all.
+    """The notes, with one note for all bearings of each kind in GATHERED, which many bearings have.
 
-    It is the one with the largest value of those in `RISING`, and else the first.
+    Of a kind in `RISING` it is the note with the largest value, of another kind the first note.
     """
     gathered = [note for note in notes if note.kind not in GATHERED]
     for kind in GATHERED:
@@ -62,20 +63,20 @@ def _gathered(notes: Sequence[Note]) -> list[Note]:
     return gathered
 
 
-def value_notes(one: BuildingBearing, load: float) -> tuple[Note, ...]:
-    """Notes about values that are hardly meant, of a bearing and its interface. load: at rest [N]."""
-    stiffness, needed, _ = standing_below(one, load)
-    doubts = (*doubtful_values(one.bearing), *unsteady("interface.rotational_stiffness", stiffness, needed))
+def value_notes(mount: BuildingBearing, load: float) -> tuple[Note, ...]:
+    """Notes about doubtful values of a bearing and its interface. load: at rest [N]."""
+    stiffness, needed, _ = standing_below(mount, load)
+    doubts = (*doubtful_values(mount.bearing), *unsteady("interface.rotational_stiffness", stiffness, needed))
     return tuple(Note(0.0, "value", *doubt) for doubt in doubts)
 
 
-LIGHT = 0.005  # mass of a floor over the mean of all floors
-GYRATION = 1.0  # radius of gyration of a floor over the largest distance between two bearings
-SHARE = 0.1  # lateral acceleration over gravity, at which drifts are compared
-DRIFT = 0.05  # largest drift over the height of the storey
-HEIGHT = 20.0  # of a storey [m]
-OF_INTERFACES = 0.2  # share of the strain energy of a mode above which the interfaces can damp it
-SAG = 0.05  # of a bearing on the vertical spring of its interface at rest [m]
+LIGHT = 0.005  # mass of a floor over the mean of all floors, below which it is doubtful
+GYRATION = 1.0  # radius of gyration of a floor over the largest distance of two bearings, above which it is doubtful
+SHARE = 0.1  # lateral acceleration over gravity at which drifts are compared
+DRIFT = 0.05  # drift over the height of the storey above which the stiffness is doubtful
+HEIGHT = 20.0  # height of a storey above which it is doubtful [m]
+OF_INTERFACES = 0.2  # share of the interfaces in the strain energy of a mode, above which they can damp the mode
+SAG = 0.05  # compression of the spring of an interface at rest above which its stiffness is doubtful [m]
 
 
 class Floor(NamedTuple):
@@ -87,7 +88,7 @@ class Floor(NamedTuple):
 
 
 def building_doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
-    """Values that are unlikely: 0 (no surface), the value, and the text of the doubt with the likely unit."""
+    """Doubtful values of a building: 0 (no surface), the value, and the text of the doubt with the likely unit."""
     yield from _floor_doubts(scene)
     yield from _storey_doubts(scene.building, scene.gravity)
     springs = np.array([one.interface.vertical_stiffness for one in scene.bearings])
@@ -103,49 +104,50 @@ def building_doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
 
 
 def floors(building: Building) -> list[Floor]:
-    """The floors of a shear frame, the base first; none where the building was given by matrices.
+    """The floors of a shear frame, the base first; none for a building of matrices.
 
-    The columns of each storey state the inertia of all floors above it; a floor is the difference of two of them.
+    The columns of each storey have the inertia of all floors above; a floor is the difference of two consecutive ones.
     """
     if not building.columns:
         return []
     motions = building.rigid_motions
-    groups = [_group(motions.T @ building.mass @ motions)]
-    groups += [_group(columns.inertia @ motions) for columns in building.columns]
-    of_frame = []
+    groups = [_mass_properties(motions.T @ building.mass @ motions)]
+    groups += [_mass_properties(columns.inertia @ motions) for columns in building.columns]
+    found = []
     for (mass, centre, inertia), (above, centre_above, inertia_above) in pairwise([*groups, (0.0, np.zeros(2), 0.0)]):
         own = mass - above
         own_centre = (mass * centre - above * centre_above) / own
-        left = inertia - inertia_above
-        left -= own * np.sum((own_centre - centre) ** 2) + above * np.sum((centre_above - centre) ** 2)
-        of_frame.append(Floor(own, own_centre, float(np.sqrt(max(left, 0.0) / own))))
-    return of_frame
+        own_inertia = inertia - inertia_above
+        own_inertia -= own * np.sum((own_centre - centre) ** 2) + above * np.sum((centre_above - centre) ** 2)
+        found.append(Floor(own, own_centre, float(np.sqrt(max(own_inertia, 0.0) / own))))
+    return found
 
 
-def _group(inertia: Array) -> tuple[float, Array, float]:
-    """Mass, centre of mass in plan and moment of inertia about E3 through it, from the 6 x 6 inertia of rigid bodies.
+def _mass_properties(inertia: Array) -> tuple[float, Array, float]:
+    """Mass [kg], centre of mass in plan, shape (2,) [m], and moment of inertia about E3 through the centre [kg m^2].
 
-    The rows may be about any point, the columns are motions about the origin: a rotation about the centre of mass
-    needs no force, so its moment is the same about every point.
+    inertia: of rigid bodies, shape (6, 6). Its columns are motions about the origin. Its rows are about any point,
+    since a rotation about the centre of mass needs no force, so that its moment is equal about all points.
     """
     mass = float(inertia[0, 0])
     x, y = inertia[1, 5] / mass, -inertia[0, 5] / mass
-    turning = inertia[:, 5] + y * inertia[:, 0] - x * inertia[:, 1]
-    return mass, np.array([x, y]), float(turning[5])
+    rotation = inertia[:, 5] + y * inertia[:, 0] - x * inertia[:, 1]
+    return mass, np.array([x, y]), float(rotation[5])
 
 
 def _path(index: int) -> str:
+    """Path in a file of a floor by its index, 0 for the base."""
     return "building.base" if index == 0 else f"building.storey[{index - 1}]"
 
 
 def _floor_doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
-    of_frame = floors(scene.building)
-    if not of_frame:
+    frame = floors(scene.building)
+    if not frame:
         return
-    mean = float(np.mean([floor.mass for floor in of_frame]))
+    mean = float(np.mean([floor.mass for floor in frame]))
     places = scene.places
     widest = float(np.linalg.norm(places[:, None] - places, axis=-1).max())
-    for index, floor in enumerate(of_frame):
+    for index, floor in enumerate(frame):
         if floor.mass < LIGHT * mean:
             text = f"{_path(index)}.mass = {floor.mass:g} kg is {floor.mass / mean:.2g} of the mean of all floors"
             yield 0, floor.mass, f"{text}; is it in kg, not in t?"
@@ -175,34 +177,34 @@ def _storey_doubts(building: Building, gravity: float) -> Iterator[tuple[int, fl
 
 
 def _drifts(building: Building, acceleration: float) -> Array:
-    """Largest drift of every storey on a fixed base under a lateral acceleration along E1 or E2 [m].
+    """Largest drift of every storey on a fixed base under a lateral acceleration, shape (storeys,) [m].
 
-    ndarray, shape (storeys,).
+    acceleration: along E1 or E2 [m/s^2].
     """
     fixed = building.fixed
     rows = np.stack([columns.deformation[:2] for columns in building.columns])[..., fixed.inner]
     forces = [building.uniform_acceleration(acceleration * axis)[fixed.inner] for axis in np.eye(3)[:2]]
-    bent = fixed.modes @ (fixed.modes.T @ np.transpose(forces) / fixed.frequencies[:, None] ** 2)
-    drifts: Array = np.linalg.norm(rows @ bent, axis=1).max(axis=1)
+    response = fixed.modes @ (fixed.modes.T @ np.transpose(forces) / fixed.frequencies[:, None] ** 2)
+    drifts: Array = np.linalg.norm(rows @ response, axis=1).max(axis=1)
     return drifts
 
 
 def _undamped(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
-    """A doubt where a mode that the interfaces could damp has less than `LEAST_DAMPING` of critical damping.
+    """A doubt where a mode that the interfaces can damp has less than `LEAST_DAMPING` of critical damping.
 
-    Yields 0 (no surface), the least damping ratio and the text with the damping that cures it.
+    Yields 0 (no surface), the least damping ratio, and the text with the damping that suffices.
     """
     modes = scene.vertical_modes
     on_springs = modes.shares > OF_INTERFACES
     if not on_springs.any():
         return
-    turns = np.sqrt(modes.squares[on_springs])
-    ratios = modes.rates[on_springs] / (2 * turns)
+    frequencies = np.sqrt(modes.squares[on_springs])  # circular [rad/s]
+    ratios = modes.rates[on_springs] / (2 * frequencies)
     least, interface = int(ratios.argmin()), scene.bearings[0].interface
     if ratios[least] < LEAST_DAMPING:
-        missing = 2 * (USUAL_DAMPING - ratios) / (turns * modes.shares[on_springs])  # damping over stiffness [s]
+        missing = 2 * (USUAL_DAMPING - ratios) / (frequencies * modes.shares[on_springs])  # damping over stiffness [s]
         damping = interface.vertical_damping
-        cure = damping + float(missing.max()) * interface.vertical_stiffness
+        sufficient = damping + float(missing.max()) * interface.vertical_stiffness
         what = "the building vibrates on the vertical springs of its interfaces"
         name = "building.interface.vertical_damping"
-        yield 0, float(ratios[least]), ringing(name, damping, what, turns[least], ratios[least], cure)
+        yield 0, float(ratios[least]), ringing(name, damping, what, frequencies[least], ratios[least], sufficient)

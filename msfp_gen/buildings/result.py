@@ -1,4 +1,4 @@
-"""`BuildingResult`: what the run of a building gives; `BearingResult`: one of its bearings."""
+"""`BuildingResult`, the result of the run of a building, and `BearingResult`, one bearing of it."""
 
 from __future__ import annotations
 
@@ -30,23 +30,35 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BuildingResult(AnyResult):
-    """The result of `simulate` of a building; a RunError has one in `.result` if the run failed after its start.
+    """The result of `simulate` for a building; a RunError has one in `.result` if the run failed after its start.
 
     Motion of the building, and forces and sliding of its bearings, at k times.
 
-    time: ndarray, shape (k,) [s]. displacement, velocity, acceleration: of the coordinates, shape (k, n), relative to
-    the place at rest, in axes that do not move with the ground: accelerations are absolute. ground: displacement,
-    velocity and acceleration of the ground, shape (k, 3, 3) [m]. support: of the ground below each bearing, shape (k,
-    bearings, 3, 3). wrench: force and moment that the lower and the upper end of each bearing exert on it, shape (k,
-    bearings, 2, 6) [N], [N m]. normal_force, sliding, rim_force, lift, the clearance between separated faces, and
-    temperature, at the start where a model has none: of the surfaces of each bearing, shape (k, bearings, most
-    surfaces) [N], [m], [degC], NaN where a bearing has no such surface. Energies, shape (k,) or (k, bearings) [J]:
-    dissipated: in each bearing; stored: in each bearing, with the springs of its interface; damped: by the damping of
-    the building; received: work of the bearings on the building, by their forces beyond those at rest; input: work of
-    the ground. counters: of the work of the solver. monitored: notes of the monitors of the bearings, each with the
-    number of its bearing. extremes: over all steps. status: "ok" or the name of a failure;
-    message: one line of text, "" for a run that succeeded. provenance: versions with which the result was computed.
-    wall_time [s].
+    Attributes:
+        time: ndarray, shape (k,) [s].
+        displacement, velocity, acceleration: of the coordinates, relative to the position at rest, in axes that do not
+            move with the ground, so that accelerations are absolute, shape (k, n) [SI].
+        ground: displacement, velocity and acceleration of the ground, shape (k, 3, 3) [SI].
+        support: displacement, velocity and acceleration of the ground below each bearing, shape (k, bearings, 3, 3)
+            [SI].
+        wrench: force and moment that the lower and the upper end of each bearing exert on it, shape (k, bearings, 2, 6)
+            [N, N m].
+        normal_force, rim_force: of the surfaces of each bearing, shape (k, bearings, most surfaces) [N]; NaN where a
+            bearing has no such surface.
+        sliding, lift: sliding and clearance between separated faces, shape as of normal_force [m].
+        temperature: of the surfaces, of the start where a model has none, shape as of normal_force [degC].
+        dissipated: in each bearing, shape (k, bearings) [J].
+        stored: in each bearing and the springs of its interface, shape (k, bearings) [J].
+        damped: by the damping of the building, shape (k,) [J].
+        received: work of the bearings on the building, by their forces beyond the loads at rest, shape (k,) [J].
+        input: work of the ground, shape (k,) [J].
+        counters: work of the solver.
+        monitored: notes of the monitors of the bearings, each with the number of its bearing.
+        extremes: over all steps.
+        status: "ok" or the name of a failure.
+        message: one line of text, "" for a run that succeeded.
+        provenance: versions with which the result was computed.
+        wall_time: of the run [s].
     """
 
     source: ClassVar[str] = "msfp-gen building"
@@ -84,12 +96,12 @@ class BuildingResult(AnyResult):
 
     @cached_property
     def notes(self) -> tuple[Note, ...]:
-        """Messages of the monitors in order of time; each names its bearing (docs/buildings.md)."""
+        """Notes in order of time; a note on a bearing begins with its label (docs/buildings.md)."""
         error, row = self.energy_error
         return notes_of(self.scene, self.monitored, error, float(self.time[row]))
 
     def node(self, name: str) -> Array:
-        """Displacement, velocity and acceleration of a node: ndarray, shape (k, 3, 6), [m], [rad] and per s, s^2."""
+        """Displacement, velocity and acceleration of a node: ndarray, shape (k, 3, 6), [m, rad], and per s and s^2."""
         rows = self.scene.building.node(name).rows
         return np.stack([values @ rows.T for values in (self.displacement, self.velocity, self.acceleration)], axis=1)
 
@@ -121,17 +133,14 @@ class BuildingResult(AnyResult):
     def corner_drift(self) -> Array:
         """Drift at the corners of the rectangle around the bearings, along E1, E2, E3, shape (k, storeys, 4, 3) [m].
 
-        Counterclockwise from that with the least coordinates.
+        The corners are counterclockwise from the corner with the least coordinates.
         """
         drift: Array = np.einsum("scin,kn->ksci", corners(self.scene), self.displacement)
         return drift
 
     @property
     def overturning_moment(self) -> Array:
-        """Moment that accelerates the building, about E1 and E2 through its centre of mass at height 0, (k, 2) [N m].
-
-        The bearings provide it, by horizontal forces at their height and by axial forces beyond those at rest.
-        """
+        """Moment that accelerates the building about E1 and E2, as of `overturning` in extremes.py, (k, 2) [N m]."""
         moment: Array = self.acceleration @ overturning(self.scene).T
         return moment
 
@@ -161,14 +170,18 @@ class BuildingResult(AnyResult):
         return 0.5 * _squares(self.displacement, self.scene.building.stiffness)
 
     def _of_storeys(self, name: str, motion: Array) -> Array:
+        """The rows `name` of the columns of every storey times a motion, shape (k, storeys, 6) [SI]."""
         columns = self.scene.building.columns
-        rows = np.array([getattr(one, name) for one in columns]).reshape(-1, 6, motion.shape[1])
+        rows = np.array([getattr(column, name) for column in columns]).reshape(-1, 6, motion.shape[1])
         values: Array = np.einsum("sin,kn->ksi", rows, motion)
         return values
 
     @cached_property
     def energy_error(self) -> tuple[float, int]:
-        """Largest difference of the work on the building from its energies, over the largest of them, and its row."""
+        """Largest error of the energy balance over the largest energy [-], and its row.
+
+        The error is the work of the bearings on the building less its kinetic, strain and damped energy.
+        """
         terms = np.stack([self.received, self.kinetic, self.strain, self.damped])
         difference = np.abs(terms[0] - terms[1:].sum(axis=0))
         row, scale = int(difference.argmax()), float(np.abs(terms).max())
@@ -182,25 +195,25 @@ class BuildingResult(AnyResult):
 
         Keys that `Result.summary` has too: name, status, message, notes, duration, counters, wall_time,
         real_time_factor; peak_displacement: across any bearing [m]; peak_force: of the ground on all bearings, the base
-        shear [N]; peak_force_ratio: radial, over the weight [-]; rims_met: bearings (from 1) of which a slider reached
-        its rim; verdict: what the bearings were asked to bear, against their limits (docs/limits.md).
+        shear [N]; peak_force_ratio: radial, over the weight [-]; rims_met: numbers (from 1) of bearings in which a
+        slider reached its rim; verdict: demands on the bearings against their limits (docs/limits.md).
 
-        Others:
+        Other keys:
 
         - weight [N].
         - peak_base_torsion: about E3 through the centre of mass [N m]. peak_twist: of the base about E3 [rad].
         - peak_overturning_moment: about E1 and E2 through the centre of mass, and radial [N m].
-        - minimum_load_ratio, maximum_load_ratio: N of any bearing over that at rest [-].
+        - minimum_load_ratio, maximum_load_ratio: axial force of any bearing over its load at rest [-].
         - peak_floor_acceleration: of any node [m/s^2]. peak_drift_ratio: of any storey;
           peak_corner_drift_ratio: at its corners [-].
-        - floors: of each node, name, height [m], peak_acceleration [m/s^2], peak_displacement relative to the ground
+        - floors: for each node name, height [m], peak_acceleration [m/s^2], peak_displacement relative to the ground
           [m].
-        - storeys: of each, name, height [m], peak_drift [m] and peak_drift_ratio [-] at the stiffness centre,
+        - storeys: for each storey name, height [m], peak_drift [m] and peak_drift_ratio [-] at the stiffness centre,
           peak_corner_drift [m] and peak_corner_drift_ratio [-] at the corners of the rectangle around the bearings,
           peak_shear [N], peak_torsion [N m].
         - bearings: see `BearingResult.summary`.
-        - energy: largest kinetic and strain energy of the building, damped (in it) and dissipated (in the bearings)
-          at the end [J]; closure_error of the balance of the building [-].
+        - energy: largest kinetic and strain energy of the building; damped by the building and dissipated by the
+          bearings at the end [J]; closure_error of the balance of the building [-].
         """
         return summaries.summarise(self)
 
@@ -213,9 +226,9 @@ class BuildingResult(AnyResult):
                 "name": node.name,
                 "height": float(node.position[2]),
                 "peak_acceleration": by_axis(acceleration),
-                "peak_displacement": by_axis(moved),
+                "peak_displacement": by_axis(displacement),
             }
-            for node, acceleration, moved in zip(self.scene.building.nodes, *peaks, strict=True)
+            for node, acceleration, displacement in zip(self.scene.building.nodes, *peaks, strict=True)
         ]
 
     @property
@@ -242,11 +255,11 @@ class BuildingResult(AnyResult):
     def main_results(self) -> Rows:
         """Label and value of the main results."""
         s = self.summary
-        moved, force, acceleration = s["peak_displacement"], s["peak_force"], s["peak_floor_acceleration"]
+        displacement, force, acceleration = s["peak_displacement"], s["peak_force"], s["peak_floor_acceleration"]
         drift = "" if s["peak_drift_ratio"] is None else f", drift {100 * s['peak_drift_ratio']:.3g} % of the height"
         return [
             time_row(s),
-            ("bearings", f"{len(self.bearings)}, peak displacement {1e3 * moved['radial']:.4g} mm"),
+            ("bearings", f"{len(self.bearings)}, peak displacement {1e3 * displacement['radial']:.4g} mm"),
             ("base shear", f"{1e-6 * force['radial']:.4g} MN ({s['peak_force_ratio']:.3f} of the weight)"),
             (
                 "floors",
@@ -258,21 +271,21 @@ class BuildingResult(AnyResult):
 
     @property
     def curve(self) -> Curve:
-        """The orbit of the bearing that moves most."""
-        most = self.bearings[int(self.extremes.bearing_displacement[:, 3].argmax())]
-        x, y = most.history.displacement[:, :2].T
-        return Curve(x, y, f"orbit of {most.label}")
+        """The orbit of the bearing with the largest displacement."""
+        bearing = self.bearings[int(self.extremes.bearing_displacement[:, 3].argmax())]
+        x, y = bearing.history.displacement[:, :2].T
+        return Curve(x, y, f"orbit of {bearing.label}")
 
     def work_rows(self) -> Rows:
-        """Label and value of its energies, its twist and its overturning moment."""
+        """Label and value of the energies, the twist and the overturning moment."""
         return summaries.work_rows(self.summary)
 
     def part_tables(self) -> list[Table]:
-        """Tables of its floors, storeys and bearings."""
+        """Tables of the floors, storeys and bearings."""
         return summaries.tables(self.summary)
 
     def characterise(self) -> BuildingCharacterisation:
-        """Effective properties of the isolation system, and what is left of every bearing (docs/buildings.md).
+        """Effective properties of the isolation system, and the demand on every bearing (docs/buildings.md).
 
         Raises InputError where the bearings did not move.
         """
@@ -287,12 +300,12 @@ def _squares(rows: Array, matrix: Array) -> Array:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BearingResult(OneBearing):
-    """One bearing of a building; names and signs are those of the `Result` of one bearing.
+    """The result of one bearing of a building; names and signs are as in the `Result` of one bearing.
 
-    building: the whole result, of which scene, status, message and provenance are. index: of the bearing, from 0.
-    history: its rows, with base_displacement of the ground below it, and displacement across it and its interface;
-    top_moment is about its upper end. bearing: its values. effects: of its model at the start. axial_load: compression
-    at rest [N]. events: none, as the run of a building does not record them.
+    building: the result of the building. index: of the bearing, from 0. history: rows of the bearing; base_displacement
+    is of the ground below it, displacement is across bearing and interface, top_moment is about its upper end. scene,
+    status, message, provenance: of `building`. bearing: values. effects: of the model at the start. axial_load:
+    compression at rest [N]. events: none, since the run of a building does not record events.
     """
 
     source: ClassVar[str] = "msfp-gen bearing"
@@ -310,7 +323,7 @@ class BearingResult(OneBearing):
 
     @classmethod
     def of(cls, building: BuildingResult, index: int) -> BearingResult:
-        """A bearing of a building, from 0."""
+        """The result of a bearing by its index, from 0."""
         scene, bearing = building.scene, building.scene.bearings[index].bearing
         base, wrench = building.support[:, index, 0], building.wrench[:, index, 1]
         across = base - building.displacement @ scene.attachments[index, :3].T  # both start at zero
@@ -347,13 +360,13 @@ class BearingResult(OneBearing):
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """The notes of its monitors, in order of time."""
+        """The notes of the monitors of this bearing, in order of time."""
         own = (note for note in self.building.monitored if note.bearing == self.number)
         return tuple(sorted(own, key=lambda note: note.time))
 
     @property
     def model_changes(self) -> tuple[Note, ...]:
-        """The notes of its monitors after which it continued with another model; `action` says with which effects."""
+        """The notes after which the run continued with another model of this bearing; `action` states its effects."""
         return tuple(note for note in self.notes if note.action)
 
     @cached_property
@@ -374,11 +387,11 @@ class BearingResult(OneBearing):
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """Main results as plain data, SI units; peaks are over all steps, lists for the surfaces, bottom first.
+        """Main results as plain data, SI units; peaks are over all steps, lists are for the surfaces, bottom first.
 
-        Keys of all bearings: see `Result.summary`; axial_load is that at rest [N]. Others: number (from 1), name,
-        layout, position; minimum_load_ratio and maximum_load_ratio: axial force over that at rest [-]; dissipated at
-        the end [J].
+        Keys of any bearing: see `Result.summary`; axial_load is at rest [N]. Other keys: number (from 1), name, layout,
+        position in plan [m]; minimum_load_ratio and maximum_load_ratio: axial force over the load at rest [-];
+        dissipated: at the end [J].
         """
         least, most = self.building.extremes.axial_force[self.index] / self.axial_load
         return {
@@ -404,10 +417,10 @@ class BearingResult(OneBearing):
         ]
 
     def derived_and_groups(self) -> tuple[tuple[str, ...], dict[str, xr.Dataset]]:
-        """None: the file of one bearing has only the dataset, for other programs."""
+        """Nothing: the file of one bearing has the dataset alone, for other programs."""
         return (), {}
 
     @cached_property
     def dataset(self) -> xr.Dataset:
-        """The rows of the bearing as an xarray.Dataset; variables, units and meanings are those of `Result.dataset`."""
+        """The rows of the bearing as an xarray.Dataset; variables, units and meanings as of `Result.dataset`."""
         return building_dataset.dataset_of_one(self)

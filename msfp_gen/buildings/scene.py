@@ -1,4 +1,7 @@
-"""`BuildingScene`: a building, its bearings and the motion of the ground; selection of the effects of each bearing."""
+"""`BuildingScene`: the input of a run: a building, its bearings and the motion of the ground.
+
+Loads at rest, vertical modes and the selected effects of each bearing follow from it.
+"""
 
 from __future__ import annotations
 
@@ -25,11 +28,11 @@ from msfp_gen.scene.standing import check_seats, check_standing, needed_rotation
 from msfp_gen.scene.top import NodeTop
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
-BALANCE = 1e-6  # largest part of the weight that the bearings do not balance at rest
-ROW_STEP = 0.01  # between rows [s]
-LEAST_SHARE = 0.1  # of the load at rest that an estimate must leave for uplift to be left out
+BALANCE = 1e-6  # part of the weight that the bearings do not balance at rest, at most
+ROW_STEP = 0.01  # time between rows [s]
+LEAST_SHARE = 0.1  # estimated least load over the load at rest, above which uplift is left out
 STEP = 5e-3  # of the linear response [s]
-SMALL = 1e-12  # of a mode that vertical motion does not excite
+SMALL = 1e-12  # relative excitation below which vertical motion does not excite a mode
 APART = 1e-3  # least distance between the axes of two bearings [m]
 REST = 1e-9  # largest velocity of the ground at the start [m/s]
 
@@ -38,10 +41,10 @@ REST = 1e-9  # largest velocity of the ground at the start [m/s]
 class BuildingBearing:
     """A bearing of a building.
 
-    bearing: its values; the same one may carry the building at several places. interface: `Top.node(...)`, stiffness
-    and damping between its top plate and the building. position: in plan [m]; None: that of the node. node: of the
-    building, to which a rigid link attaches it. effects: of its model, or `Auto`: selected from the scene, as None is.
-    name: for messages and results. motion: of the ground below it; None: that of the scene. Raises InputError.
+    bearing: values, which several bearings of a building may share. interface: `Top.node(...)`, stiffness and damping
+    between top plate and building. position: in plan [m]; None: of the node. node: of the building; a rigid link
+    connects the bearing to it. effects: of the model; `Auto` or None: selected from the scene. name: for messages and
+    results. motion: of the ground below the bearing; None: of the scene. Raises InputError.
     """
 
     bearing: Bearing
@@ -67,20 +70,20 @@ class BuildingBearing:
 
 
 def standing_below(mount: BuildingBearing, load: float) -> tuple[float, float, float]:
-    """Rotational stiffness of an interface, that which its plate needs, and the load: see `scene/standing.py`.
+    """Rotational stiffness of an interface [N m/rad], the stiffness that its plate needs [N m/rad], and the load [N].
 
-    The building, which holds no plate at its place, follows it sideways.
+    For the checks of `scene/standing.py`. The building holds no plate at its place but follows it sideways.
     """
     weight = float(load)
     return mount.interface.rotational_stiffness, needed_rotational_stiffness(mount.bearing, weight, 0.0), weight
 
 
 class VerticalModes(NamedTuple):
-    """Modes of a building whose bearings resist vertical motion alone, with n modes and coordinates.
+    """The n modes of a building with n coordinates whose bearings resist vertical motion alone.
 
-    squares: of circular frequencies, shape (n,) [1/s^2]. shapes: columns, of unit modal mass. rates: twice the damping
-    ratio times the circular frequency, shape (n,) [1/s]. shares: of the strain energy that the springs of the
-    interfaces have, shape (n,).
+    squares: of circular frequencies, shape (n,) [1/s^2]. shapes: of unit modal mass, one in each column, shape (n, n)
+    [SI]. rates: twice the damping ratio times the circular frequency, shape (n,) [1/s]. shares: strain energy of the
+    springs of the interfaces over the strain energy of the mode, shape (n,) [-].
     """
 
     squares: Array
@@ -93,11 +96,11 @@ class VerticalModes(NamedTuple):
 class BuildingScene:
     """The complete input of the run of a building.
 
-    building; bearings: at least one, of any layouts. motion: of the ground, from rest, in translation; displacements
-    count from the start. solver: of steps that the building and all bearings take together. duration [s]; None: that of
-    the motion. output_step: between rows, at which steps end [s]; None: 10 ms. limits: of its bearings, for the verdict
-    of the run; None: those of `Limits()`. fidelity: the level at which it was made, for its notes. Raises InputError:
-    inconsistent parts, or weights that the bearings do not balance.
+    building: the superstructure. bearings: at least one, of any layouts. motion: of the ground, from rest, in
+    translation; displacements count from the start. solver: for the common steps of building and bearings. duration:
+    of the run [s]; None: of the motion. output_step: time between rows, at which steps end [s]; None: 10 ms. limits: of
+    the bearings, for the verdict of the run; None: as of `Limits()`. fidelity: level of the model, for the notes.
+    Raises InputError: inconsistent parts, or weights that the bearings do not balance.
     """
 
     building: Building
@@ -149,7 +152,7 @@ class BuildingScene:
 
     @cached_property
     def grounds(self) -> tuple[list[Motion], list[int]]:
-        """The different motions of the ground, that of the scene first, and the index of that of each bearing."""
+        """The different motions of the ground, the motion of the scene first; and for each bearing the index of its."""
         motions, indices = [self.motion], []
         for mount in self.bearings:
             own = self.motion if mount.motion is None else mount.motion
@@ -165,7 +168,7 @@ class BuildingScene:
 
     @property
     def gravity(self) -> float:
-        """Acceleration of gravity, that of the bearings [m/s^2]."""
+        """Acceleration of gravity, as of all bearings [m/s^2]."""
         return self.bearings[0].bearing.gravity
 
     @property
@@ -189,13 +192,13 @@ class BuildingScene:
         return np.array([node if mount.position is None else mount.position for mount, node in pairs], dtype=float)
 
     def label(self, index: int) -> str:
-        """What messages call a bearing."""
+        """The name of a bearing in messages. index: from 0."""
         name = self.bearings[index].name
         return f"bearing {index + 1}" + (f" ({name})" if name else "")
 
     @cached_property
     def attachments(self) -> Array:
-        """Motion of the upper ends of the bearings: rows, shape (bearings, 6, n) [SI]."""
+        """Rows, as of a node, of the upper ends of the bearings, shape (bearings, 6, n) [SI]."""
         nodes = [self._node(index) for index in range(len(self.bearings))]
         return np.stack(
             [
@@ -218,7 +221,7 @@ class BuildingScene:
         rows = self.attachments[:, 2]
         springs = np.array([mount.interface.vertical_stiffness for mount in self.bearings])
         stiffness = self.building.stiffness + rows.T * springs @ rows
-        # Horizontal motions meet no spring: the least of all solutions. Rounding is relative to each coordinate.
+        # No spring resists horizontal motions: the smallest solution is taken. Rounding is relative to each coordinate.
         scale = 1 / np.sqrt(np.maximum(np.diag(stiffness), 1e-9 * np.diag(stiffness).max()))
         scaled = scale[:, None] * stiffness * scale
         if not (np.isfinite(scaled).all() and np.isfinite(scale * self.weights).all()):
@@ -228,13 +231,14 @@ class BuildingScene:
         at_rest = scale * np.linalg.lstsq(scaled, scale * self.weights, rcond=1e-12)[0]
         loads: Array = -springs * (rows @ at_rest)
         motions = self.building.rigid_motions
-        left = motions.T @ (self.weights + rows.T @ loads)
+        unbalanced = motions.T @ (self.weights + rows.T @ loads)
         weight = float(np.abs(motions[:, 2] @ self.weights))
         arms = np.array([1.0, 1.0, 1.0, *3 * [max(1.0, float(np.abs(rows @ motions[:, 3:]).max()))]])
-        if np.any(np.abs(left) > BALANCE * weight * arms):
+        if np.any(np.abs(unbalanced) > BALANCE * weight * arms):
             raise InputError(
                 "scene.bearings: vertical forces at their positions do not balance the weight of the building about "
-                f"E1 and E2 ({left[3]:.4g}, {left[4]:.4g} N m are left); place them around the centre of mass"
+                f"E1 and E2 ({unbalanced[3]:.4g}, {unbalanced[4]:.4g} N m are left); place them around the centre of "
+                "mass"
             )
         for index, load in enumerate(loads):
             if load <= 0:
@@ -276,18 +280,18 @@ class BuildingScene:
 
     @property
     def every_bearing(self) -> tuple[Bearing, ...]:
-        """The values of its bearings, in their order."""
-        return tuple(one.bearing for one in self.bearings)
+        """The values of all bearings, in the order of the bearings."""
+        return tuple(mount.bearing for mount in self.bearings)
 
     @property
     def specs(self) -> tuple[ModelSpec, ...]:
         """Layouts and effects of the models of the bearings, each once."""
         pairs = zip(self.bearings, self.modelled, strict=True)
-        models = [ModelSpec(one.bearing.layout, replace(effects, top_rotation=True)) for one, effects in pairs]
+        models = [ModelSpec(mount.bearing.layout, replace(effects, top_rotation=True)) for mount, effects in pairs]
         return tuple(dict.fromkeys(models))
 
     def _node(self, index: int) -> Node:
-        """The node to which a bearing is attached. Raises InputError: there is none, or it carries no bearing."""
+        """The node to which a bearing is attached. Raises InputError: unknown node, or a node that carries none."""
         name = self.bearings[index].node
         with prefixed(f"scene.bearings[{index}]."):
             node = self.building.node(name)
@@ -296,7 +300,7 @@ class BuildingScene:
         return node
 
     def _tension(self, load: float) -> str:
-        """Why a bearing carries no compression at rest."""
+        """Why a bearing carries no compression at rest, for a message. load: at rest [N]."""
         centre, low, high = self.mass_centre, self.places.min(axis=0), self.places.max(axis=0)
         where = f"the centre of mass of the building at ({centre[0]:.3g}, {centre[1]:.3g}) m"
         if np.any(centre < low) or np.any(centre > high):
@@ -305,7 +309,7 @@ class BuildingScene:
         return f"it would be in tension at rest ({load:.4g} N), where a bearing cannot pull: {where} loads the others"
 
     def _check_places(self) -> None:
-        """Raise InputError where two bearings have one place or one name."""
+        """Raise InputError where two bearings have the same place or the same name."""
         places = np.column_stack([self.places, [self._node(i).position[2] for i in range(len(self.bearings))]])
         named: dict[str, int] = {}
         for second, bearing in enumerate(self.bearings):
@@ -323,6 +327,7 @@ class BuildingScene:
                 )
 
     def _check_motion(self) -> None:
+        """Raise InputError where a motion rotates, does not start from rest, or ends before the run."""
         own = {f"scene.bearings[{i}].motion": mount.motion for i, mount in enumerate(self.bearings) if mount.motion}
         for name, motion in {"scene.motion": self.motion, **own}.items():
             if np.any(motion.coefficients[:, 3:]):
@@ -339,6 +344,7 @@ class BuildingScene:
 
 
 def _selected(scene: BuildingScene, index: int, remaining: float) -> EffectSelection:
+    """The effects of a bearing by its index, with reasons. remaining: as of `remaining_loads`. Raises InputError."""
     mount = scene.bearings[index]
     requested = Auto() if mount.effects is None else mount.effects
     if isinstance(requested, Effects):
@@ -353,7 +359,7 @@ def _selected(scene: BuildingScene, index: int, remaining: float) -> EffectSelec
 
 
 def _reasons(bearing: Bearing, requested: Auto, remaining: float) -> tuple[Reason, ...]:
-    """The selection of every effect that `Auto` leaves open. remaining: as of `remaining_loads`; -inf: not known."""
+    """The choice and reason of every effect. remaining: as of `remaining_loads`; -inf: not known."""
     capacity = min(surface.capacity for surface in bearing.surfaces)
     friction = select_friction(bearing, requested.friction_law)
     lifts = remaining <= LEAST_SHARE and requested.sliders != "massless"
@@ -371,11 +377,11 @@ def _reasons(bearing: Bearing, requested: Auto, remaining: float) -> tuple[Reaso
 
 
 def remaining_loads(scene: BuildingScene) -> Array:
-    """An estimate of the least axial load of every bearing over that at rest, ndarray, shape (bearings,), [-].
+    """An estimate of the least axial load of every bearing over its load at rest, ndarray, shape (bearings,), [-].
 
-    The ground moves as below the first bearing. Vertically the response of the linear building on the springs of its
-    interfaces; beyond that it overturns as a rigid body under the horizontal force of its bearings where all surfaces
-    slide, at the largest distance of the ground from its start.
+    The ground moves everywhere as below the first bearing. The load changes by the vertical response of the linear
+    building on the springs of its interfaces, and by overturning as a rigid body under the horizontal force of the
+    bearings: all surfaces slide, at the largest distance of the ground from its start.
     """
     times = np.arange(0.0, scene.end, STEP)
     path = scene.first_ground.displacement(times)[:, :2]
@@ -387,7 +393,7 @@ def remaining_loads(scene: BuildingScene) -> Array:
 def _vertical_response(scene: BuildingScene, times: Array) -> Array:
     """Change of the axial loads under the vertical motion of the ground, shape (times, bearings) [N].
 
-    By superposition of modes, each with its share of the damping, exact for an acceleration that is linear in a step.
+    By superposition of modes, without the coupling by damping; exact for an acceleration that is linear in a step.
     """
     from scipy.signal import cont2discrete, lfilter
 
@@ -395,10 +401,10 @@ def _vertical_response(scene: BuildingScene, times: Array) -> Array:
     springs = np.array([mount.interface.vertical_stiffness for mount in scene.bearings])
     dampers = np.array([mount.interface.vertical_damping for mount in scene.bearings])
     squares, modes, rates, _ = scene.vertical_modes
-    part = -modes.T @ building.mass @ building.rigid_motions[:, 2]
+    modal_forces = -modes.T @ building.mass @ building.rigid_motions[:, 2]
     ground = scene.first_ground.acceleration(times)[:, 2]
     loads = np.zeros((len(times), len(rows)))
-    for mode, square, rate, force in zip(modes.T, squares, rates, part, strict=True):
+    for mode, square, rate, force in zip(modes.T, squares, rates, modal_forces, strict=True):
         along = rows @ mode
         if abs(force) * np.abs(along).max() < SMALL * np.abs(building.mass @ mode).max():
             continue
@@ -410,10 +416,13 @@ def _vertical_response(scene: BuildingScene, times: Array) -> Array:
 
 def _overturning(scene: BuildingScene, distance: float) -> Array:
     """Largest change of the axial loads by overturning, shape (bearings,) [N]. distance: of the ground [m]."""
-    surfaces = [bearing.surfaces for bearing in scene.every_bearing]  # all of a bearing slide, by that distance
-    share = max(max(s.friction for s in own) + distance / sum(s.radius for s in own) for own in surfaces)
+    ratio = max(  # horizontal force over load, where all surfaces of a bearing slide
+        max(surface.friction for surface in bearing.surfaces)
+        + distance / sum(surface.radius for surface in bearing.surfaces)
+        for bearing in scene.every_bearing
+    )
     motions = scene.building.rigid_motions
-    moment = share * scene.gravity * float(np.abs((motions.T @ scene.building.mass @ motions)[0, 4]))
+    moment = ratio * scene.gravity * float(np.abs((motions.T @ scene.building.mass @ motions)[0, 4]))
     springs = np.array([mount.interface.vertical_stiffness for mount in scene.bearings])
     arms = scene.attachments[:, 2] @ motions[:, 3:5]
     arms -= springs @ arms / springs.sum()

@@ -1,4 +1,7 @@
-"""`Node`, `Storey` and `BaseSlab`: points, floors and columns of a frame with rigid diaphragms, and its matrices."""
+"""A frame with rigid diaphragms: base slab and storeys come in; mass, stiffness, nodes and columns go out.
+
+The soil below a bearing is here too.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, check_fields, require_type
 from msfp_gen.scene.top import NodeTop
 
-HIGHEST = 1000.0  # storey [m]
+HIGHEST = 1000.0  # height of a storey, at most [m]
 FREEDOMS = 6  # of a node: displacements along E1, E2, E3 and rotations about them
 MOTIONS = ("translation along E1", "translation along E2", "translation along E3",
            "rotation about E1", "rotation about E2", "rotation about E3")  # fmt: skip
@@ -24,9 +27,9 @@ MOTIONS = ("translation along E1", "translation along E2", "translation along E3
 class Node:
     """A point of a building.
 
-    name: a label. position: ndarray, shape (3,), [m]: in plan, and height above the nodes of the bearings. rows:
-    ndarray, shape (6, n): displacements [m] and rotations [rad] of the node from the n coordinates of the building.
-    carries: whether bearings may be attached to the node.
+    name: a label. position: in plan, and height above the nodes of the bearings, ndarray, shape (3,), [m]. rows:
+    ndarray, shape (6, n); times the n coordinates of the building they are displacements [m] and rotations [rad] of the
+    node. carries: whether bearings may be attached to the node.
     """
 
     name: str
@@ -35,15 +38,15 @@ class Node:
     carries: bool = False
 
     def linked(self, position: ArrayLike) -> Array:
-        """Motion of a point [m] that a rigid link connects to the node: rows as those of the node, shape (6, n)."""
+        """Rows, as of a node, of a point that a rigid link connects to the node, shape (6, n) [SI]. position: [m]."""
         moved: Array = rigid(np.asarray(position, dtype=float) - self.position) @ self.rows
         return moved
 
 
 def rigid(arm: ArrayLike) -> Array:
-    """Six motions of a point of a rigid body from those of another, for small rotations: ndarray, shape (6, 6).
+    """The matrix from the six motions of a point A of a rigid body to those of a point B: ndarray, shape (6, 6), [SI].
 
-    arm: from the latter point to the former, shape (3,) [m].
+    For small rotations. arm: from A to B, shape (3,) [m].
     """
     x, y, z = np.asarray(arm, dtype=float)
     motion = np.eye(FREEDOMS)
@@ -55,7 +58,7 @@ _POINT = Quantity("m", shape=(2,))
 _INERTIA = Quantity("kg m^2", above=0.0, shape=(3,))
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
-_OWN = [0, 1, 5]  # freedoms of a floor on rigid columns that do not follow the floor below
+_OWN = [0, 1, 5]  # freedoms of a floor on columns that do not shorten; the others follow the floor below
 
 
 @dataclass(frozen=True)
@@ -76,13 +79,13 @@ class BaseSlab:
 
 @dataclass(frozen=True)
 class Storey:
-    """A floor, and the columns that carry it: springs at half height, as columns between rigid floors have them.
+    """A floor and the columns that carry it, which act as springs at half height between rigid floors.
 
     height: from the floor below [m]. mass, inertia, mass_centre: of the floor, as in `BaseSlab`. stiffness: of all
-    columns along E1 and E2, of fixed ends 12 E I/h^3 each; one number for both [N/m]. torsional_stiffness: about E3
-    through the stiffness centre [N m/rad]. stiffness_centre: in plan [m]. vertical_stiffness [N/m] and
-    rocking_stiffness, about E1 and E2 [N m/rad]: of columns that shorten; None for both: the floor has no vertical
-    motion and no tilt of its own but follows the floor below. Raises InputError.
+    columns along E1 and E2, of a column with fixed ends 12 E I/h^3; one number for both directions [N/m].
+    torsional_stiffness: about E3 through the stiffness centre [N m/rad]. stiffness_centre: in plan [m].
+    vertical_stiffness [N/m] and rocking_stiffness, about E1 and E2 [N m/rad]: of columns that shorten; None for both:
+    in vertical motion and tilt the floor follows the floor below. Raises InputError.
     """
 
     height: Annotated[float, Quantity("m", above=0.0)]
@@ -109,17 +112,18 @@ class Storey:
 
     @property
     def springs(self) -> Array:
-        """Stiffnesses of the columns along [N/m] and about [N m] E1, E2, E3, shape (6,); 0 where they are rigid."""
+        """Stiffness of the columns along [N/m] and about [N m] E1, E2, E3, shape (6,); 0 for columns that are rigid."""
         k1, k2 = self.stiffness  # type: ignore[misc]  # a pair after the check
         r1, r2 = self.rocking_stiffness or (0.0, 0.0)  # type: ignore[misc]
         return np.array([k1, k2, self.vertical_stiffness or 0.0, r1, r2, self.torsional_stiffness])
 
 
 class Columns(NamedTuple):
-    """What is stated of the columns of a storey, at half height at their stiffness centre.
+    """Deformation and force of the columns of a storey, at half height at the stiffness centre.
 
-    deformation: rows, shape (6, n) [SI]: motion of the floor above relative to that below, both extended rigidly.
-    inertia: rows, shape (6, n) [SI]: force and moment that accelerate all floors above, from the accelerations.
+    deformation: rows, shape (6, n) [SI]; times the coordinates they are the motion of the floor above relative to the
+    floor below, both extended rigidly. inertia: rows, shape (6, n) [SI]; times the accelerations they are the force and
+    moment that accelerate all floors above.
     """
 
     name: str
@@ -128,9 +132,9 @@ class Columns(NamedTuple):
 
 
 def frame(base: BaseSlab, storeys: Sequence[Storey]) -> tuple[Array, Array, tuple[Node, ...], tuple[Columns, ...]]:
-    """Mass and stiffness of an undamped frame, shape (n, n) [SI], its floors from the base upwards, and its columns.
+    """Mass and stiffness of an undamped frame, both shape (n, n) [SI], its floors from the base upwards, and columns.
 
-    Its coordinates are those of the floors at the origin of the plan.
+    The coordinates are motions of the floors at the origin of the plan.
     """
     nodes = _floors(storeys)
     floors: list[BaseSlab | Storey] = [base, *storeys]
@@ -144,37 +148,39 @@ def frame(base: BaseSlab, storeys: Sequence[Storey]) -> tuple[Array, Array, tupl
 
 
 def _inertia(node: Node, floor: BaseSlab | Storey) -> Array:
-    """Force and moment about the node that accelerate the floor: rows, shape (6, n)."""
+    """Rows, shape (6, n) [SI]; times the accelerations they are force and moment about the node on its floor."""
     arm = rigid([*floor.mass_centre, 0.0])
     rows: Array = arm.T * [*3 * [floor.mass], *floor.inertia] @ arm @ node.rows
     return rows
 
 
 def _floors(storeys: Sequence[Storey]) -> tuple[Node, ...]:
+    """The nodes of the base and of all floors, at the origin of the plan."""
     sizes = [FREEDOMS, *(len(_OWN) if storey.vertical_stiffness is None else FREEDOMS for storey in storeys)]
     ends = np.cumsum(sizes)
-    place = np.eye(ends[-1])
-    nodes = [Node("base", np.zeros(3), place[:FREEDOMS], carries=True)]
+    unit_rows = np.eye(ends[-1])
+    nodes = [Node("base", np.zeros(3), unit_rows[:FREEDOMS], carries=True)]
     height = 0.0
     for index, (storey, end, size) in enumerate(zip(storeys, ends[1:], sizes[1:], strict=True), 1):
         height += storey.height
         position = np.array([0.0, 0.0, height])
         rows = nodes[-1].linked(position)
-        rows[_OWN if size < FREEDOMS else slice(None)] = place[end - size : end]
+        rows[_OWN if size < FREEDOMS else slice(None)] = unit_rows[end - size : end]
         nodes.append(Node(f"floor {index}", position, rows))
     return tuple(nodes)
 
 
 def _columns(nodes: Sequence[Node], inertias: Sequence[Array], index: int, storey: Storey) -> Columns:
+    """The columns of a storey by its index, from 1. inertias: of all floors, as of `_inertia`."""
     below, floor = nodes[index - 1], nodes[index]
     point = np.array([*storey.stiffness_centre, (below.position[2] + floor.position[2]) / 2])
     inertia = np.zeros_like(floor.rows)
-    for node, own in zip(nodes[index:], inertias[index:], strict=True):
-        inertia += rigid(node.position - point).T @ own
+    for node, of_floor in zip(nodes[index:], inertias[index:], strict=True):
+        inertia += rigid(node.position - point).T @ of_floor
     return Columns(f"storey {index}", floor.linked(point) - below.linked(point), inertia)
 
 
-# What a soil of this model does not have -> the reason and the remedy.
+# Field of `Soil` that is not modelled -> reason and remedy.
 REFUSED = {
     "rotational_stiffness": "the lower plate of a bearing does not tilt with its foundation; leave it out: a building "
     "rocks on the vertical springs below its bearings",
@@ -205,10 +211,11 @@ class Soil:
                 raise InputError(f"soil.{name} = {value:g}: {reason}")
 
     def below(self, interface: NodeTop) -> NodeTop:
-        """The interface of a bearing on this soil: both in series.
+        """The interface of a bearing on this soil: interface and soil in series.
 
-        A bearing is light beside what it carries, so the same force passes through both, in either order. Dampers: the
-        energy that both lose in slow motion; exact where damping over stiffness is the same of both. Raises InputError.
+        A bearing is light beside the load that it carries, so that the same force passes through interface and soil, in
+        either order. The damping gives the energy that the two lose in slow motion; it is exact where damping over
+        stiffness is equal in both. Raises InputError.
         """
         require_type(interface, NodeTop, "interface")
         along = _in_series(interface.stiffness, interface.damping, self.stiffness, self.damping)
@@ -225,6 +232,6 @@ class Soil:
 
 
 def _in_series(k1: float, c1: float, k2: float, c2: float) -> tuple[float, float]:
-    """Stiffness and damping of two springs in series, each with a damper beside it; to first order in frequency."""
+    """Stiffness and damping of two springs in series, each with a damper in parallel; to first order in frequency."""
     stiffness = k1 / (1 + k1 / k2)
     return stiffness, c1 * (stiffness / k1) ** 2 + c2 * (stiffness / k2) ** 2

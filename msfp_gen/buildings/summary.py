@@ -1,4 +1,4 @@
-"""Peaks of the floors and storeys of a building as plain data, the tables of its summary, and its characterisation."""
+"""Summary of the result of a building as plain data, its tables, and the characterisation of the isolation system."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ Columns = dict[str, tuple[str, str, float, str]]
 
 
 def summarise(result: Any) -> dict[str, Any]:
-    """Summary of a `BuildingResult`, which lists its keys."""
+    """The summary of a `BuildingResult`; `BuildingResult.summary` lists its keys."""
     extremes, weight = result.extremes, result.scene.weight
-    bearings = [one.summary for one in result.bearings]
+    bearings = [bearing.summary for bearing in result.bearings]
     floors, storeys = result.floors, result.storeys
     force = by_axis(extremes.base_reaction)
     return {
         **summary_of_run(result, result.time, result.counters, result.wall_time),
-        "peak_displacement": _largest([one["peak_displacement"] for one in bearings]),
+        "peak_displacement": _largest([bearing["peak_displacement"] for bearing in bearings]),
         "weight": weight,
         "peak_force": force,
         "peak_force_ratio": force["radial"] / weight,
@@ -34,9 +34,9 @@ def summarise(result: Any) -> dict[str, Any]:
             key: value for key, value in by_axis(extremes.overturning_moment).items() if key != "E3"
         },
         "peak_twist": float(extremes.base_twist[0]),
-        "minimum_load_ratio": min(one["minimum_load_ratio"] for one in bearings),
-        "maximum_load_ratio": max(one["maximum_load_ratio"] for one in bearings),
-        "rims_met": [one["number"] for one in bearings if one["rims_met"]],
+        "minimum_load_ratio": min(bearing["minimum_load_ratio"] for bearing in bearings),
+        "maximum_load_ratio": max(bearing["maximum_load_ratio"] for bearing in bearings),
+        "rims_met": [bearing["number"] for bearing in bearings if bearing["rims_met"]],
         "peak_floor_acceleration": _largest([floor["peak_acceleration"] for floor in floors]),
         "peak_drift_ratio": max((storey["peak_drift_ratio"] for storey in storeys), default=None),
         "peak_corner_drift_ratio": max((storey["peak_corner_drift_ratio"] for storey in storeys), default=None),
@@ -55,7 +55,8 @@ def summarise(result: Any) -> dict[str, Any]:
 
 
 def _largest(peaks: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    return {key: max(one[key] for one in peaks) for key in peaks[0]}
+    """The largest value of each component of several peaks."""
+    return {component: max(peak[component] for peak in peaks) for component in peaks[0]}
 
 
 def work_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -70,7 +71,7 @@ def work_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
-    """Tables of a summary: the floors, storeys and bearings."""
+    """Tables of the floors, storeys and bearings of a summary, and of bearings that lifted."""
     floors = _upwards("peaks of floors: absolute acceleration, displacement from the ground", FLOORS, summary["floors"])
     storeys = [_upwards("peaks of storeys", STOREYS, summary["storeys"])] if summary["storeys"] else []
     bearings = summary["bearings"]
@@ -79,7 +80,7 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
 
 
 def rims_text(bearings: Sequence[Mapping[str, Any]]) -> str:
-    """The surfaces that met their rims, and the bearings in which they did, by name or number."""
+    """The surfaces that met their rims, and for these the bearings by name or number, as text."""
     groups: dict[str, list[str]] = {}
     for bearing in bearings:
         if bearing["rims_met"]:
@@ -102,7 +103,7 @@ def _energy(energy: Mapping[str, float]) -> str:
     )
 
 
-# Column -> (key of a floor, component of it, scale, format).
+# Column -> (key of a floor, component of its value, scale, format).
 FLOORS: Columns = {
     "floor": ("name", "", 1, ""),
     "z [m]": ("height", "", 1, "g"),
@@ -112,7 +113,7 @@ FLOORS: Columns = {
     "u1 [mm]": ("peak_displacement", "E1", 1e3, ".1f"),
     "u2": ("peak_displacement", "E2", 1e3, ".1f"),
 }
-STOREYS: Columns = {  # likewise of a storey
+STOREYS: Columns = {  # as FLOORS, of a storey
     "storey": ("name", "", 1, ""),
     "drift 1 [mm]": ("peak_drift", "E1", 1e3, ".2f"),
     "drift 2": ("peak_drift", "E2", 1e3, ".2f"),
@@ -134,7 +135,7 @@ def _upwards(title: str, columns: Columns, parts: Sequence[Mapping[str, Any]]) -
 
 
 def _bearings(bearings: Sequence[Mapping[str, Any]]) -> Table:
-    """Peaks of every bearing."""
+    """Table of the peaks of every bearing."""
     rows = [
         (
             str(bearing["number"]),
@@ -153,7 +154,7 @@ def _bearings(bearings: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _uplift(bearings: Sequence[Mapping[str, Any]]) -> Table:
-    """Uplift of every bearing that lifted."""
+    """Table of the uplift of every bearing that lifted."""
     rows = [
         (
             str(bearing["number"]),
@@ -172,9 +173,9 @@ def _uplift(bearings: Sequence[Mapping[str, Any]]) -> Table:
 class BearingDemand:
     """Demand on one bearing.
 
-    number: from 1. name. peak_displacement: horizontal [m]. capacity_left: least of its surfaces [m].
-    minimum_load_ratio, maximum_load_ratio: N over N at rest [-]. residual_displacement: None where the bearing still
-    moves when the run ends [m]. dissipated [J].
+    number: from 1. name: of the bearing. peak_displacement: horizontal [m]. capacity_left: least of its surfaces [m].
+    minimum_load_ratio, maximum_load_ratio: axial force over the load at rest [-]. residual_displacement: [m]; None
+    where the bearing still moves when the run ends. dissipated: energy at the end [J].
     """
 
     number: int
@@ -189,15 +190,16 @@ class BearingDemand:
 
 @dataclass(frozen=True, repr=False)
 class BuildingCharacterisation(Characterisation):
-    """Result of `characterise` for a building, in SI units: its isolation system as one bearing, and each bearing.
+    """Result of `characterise` for a building, in SI units: the isolation system as one bearing, and each bearing.
 
-    The displacement is the mean of the bearings, the force the base shear, the load the weight, and energy is that of
-    all bearings; there are no sliding regimes and no surfaces.
+    The displacement is the mean of the bearings, the force the base shear, the load the weight, and the energy the sum
+    over the bearings. There are no sliding regimes and no surfaces.
 
     Attributes:
-        secant_period: of the building as a rigid mass with the secant stiffness [s].
-        peak_floor_acceleration: horizontal, of any floor [m/s^2]. peak_drift_ratio: of any storey; None without [-].
-        bearings: demands on each.
+        secant_period: of the building as a rigid mass on the secant stiffness [s].
+        peak_floor_acceleration: horizontal, of any floor [m/s^2]. peak_drift_ratio: of any storey [-]; None without
+            storeys.
+        bearings: the demand on each bearing.
     """
 
     FORCE: ClassVar[str] = "peak base shear"
@@ -212,8 +214,8 @@ class BuildingCharacterisation(Characterisation):
     @classmethod
     def of(cls, result: Any) -> BuildingCharacterisation:
         """Characterise the run of a `BuildingResult`. Raises InputError where the bearings did not move."""
-        mean, summary = np.mean([one.history.displacement for one in result.bearings], axis=0), result.summary
-        paths = [one.history.displacement[:, :2] for one in result.bearings]
+        summary, displacements = result.summary, [bearing.history.displacement for bearing in result.bearings]
+        mean, paths = np.mean(displacements, axis=0), [displacement[:, :2] for displacement in displacements]
         path = ForcePath.of(result.time, mean, result.base_reaction, "the building")
         peaks = (float(result.extremes.mean_displacement[3]), summary["peak_force"]["radial"])
         load, gravity = result.scene.weight, result.scene.gravity
@@ -227,22 +229,22 @@ class BuildingCharacterisation(Characterisation):
             peak_drift_ratio=summary["peak_drift_ratio"],
             bearings=tuple(
                 BearingDemand(
-                    one["number"],
-                    one["name"],
-                    one["peak_displacement"]["radial"],
-                    min(one["minimum_gap"]),
-                    one["minimum_load_ratio"],
-                    one["maximum_load_ratio"],
+                    bearing["number"],
+                    bearing["name"],
+                    bearing["peak_displacement"]["radial"],
+                    min(bearing["minimum_gap"]),
+                    bearing["minimum_load_ratio"],
+                    bearing["maximum_load_ratio"],
                     float(np.hypot(*u[-1])) if rests(result.time, u) else None,
-                    one["dissipated"],
+                    bearing["dissipated"],
                 )
-                for one, u in zip(summary["bearings"], paths, strict=True)
+                for bearing, u in zip(summary["bearings"], paths, strict=True)
             ),
         )
 
     @property
     def title(self) -> str:
-        """What it is of."""
+        """Title of the characterisation, with the name of the building."""
         return f"isolation system of {self.name or 'the building'}"
 
     def rows(self) -> list[tuple[str, str]]:
@@ -252,7 +254,7 @@ class BuildingCharacterisation(Characterisation):
 
     @property
     def capacity_left(self) -> float:
-        """The least of all bearings [m]."""
+        """Capacity less sliding, the least of all surfaces of all bearings [m]."""
         return min(bearing.capacity_left for bearing in self.bearings)
 
     def demand_table(self) -> Table:
