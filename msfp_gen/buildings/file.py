@@ -97,7 +97,7 @@ SCENE = model_of(
 )
 _buildings: Kept[Building] = Kept(256 << 20, lambda building: 3 * building.mass.nbytes)
 MATRICES = paths_in(FrameTable)
-FILES = {"motion": paths_in(*KINDS.values()), "building": MATRICES}  # table -> its keys that are paths of files  # table -> keys that are paths of files
+FILES = {"motion": paths_in(*KINDS.values()), "building": MATRICES}  # table -> keys that are paths of files
 
 
 def building_from_table(
