@@ -74,8 +74,8 @@ def _indices_of_array(shape: tuple[int, int], symmetry: str) -> tuple[Indices, I
     Entries are by columns; a column of a symmetric matrix begins at the diagonal.
     """
     columns, rows = (index.ravel() for index in np.indices(shape[::-1]))
-    kept = rows >= columns if symmetry == "symmetric" else np.full(rows.shape, True)
-    return rows[kept], columns[kept]
+    stored = rows >= columns if symmetry == "symmetric" else np.full(rows.shape, True)
+    return rows[stored], columns[stored]
 
 
 _HIGHEST = 1e6  # largest frequency that is accepted [Hz]

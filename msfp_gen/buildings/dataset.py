@@ -232,8 +232,8 @@ def to_dataset(result: Any) -> xr.Dataset:
     about = attributes_of(result, edition(), scene_text(result.scene), result.monitored, counters)
     about |= {"motion": PIECES, "padding": "NaN: the bearing has no such surface"}
     storeys = bool(result.scene.building.columns)
-    shown = {name: v for name, v in VARIABLES.items() if storeys or "storey" not in v.dims}
-    return dataset_of(shown, arrays_of(result), labelled(labels_of(result.scene)), about)
+    variables = {name: variable for name, variable in VARIABLES.items() if storeys or "storey" not in variable.dims}
+    return dataset_of(variables, arrays_of(result), labelled(labels_of(result.scene)), about)
 
 
 def dataset_of_one(result: Any) -> xr.Dataset:

@@ -351,5 +351,5 @@ def _numbers(members: Iterable[int], count: int) -> str:
     if len(numbers) == count:
         return "all bearings" if count > 1 else "the bearing"
     runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
-    shown = ", ".join(f"{run[0]}" if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
-    return f"bearing{'s' if len(numbers) > 1 else ''} {shown}"
+    ranges = ", ".join(f"{run[0]}" if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
+    return f"bearing{'s' if len(numbers) > 1 else ''} {ranges}"

@@ -91,7 +91,7 @@ def building_doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
     """Doubtful values of a building: 0 (no surface), the value, and the text of the doubt with the likely unit."""
     yield from _floor_doubts(scene)
     yield from _storey_doubts(scene.building, scene.gravity)
-    springs = np.array([one.interface.vertical_stiffness for one in scene.bearings])
+    springs = np.array([mount.interface.vertical_stiffness for mount in scene.bearings])
     sags = scene.axial_loads / springs
     index = int(sags.argmax())
     if sags[index] > SAG:

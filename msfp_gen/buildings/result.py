@@ -340,8 +340,10 @@ class BearingResult(OneBearing):
             energy={name: getattr(building, name)[:, index] for name in ENERGY_BELOW},
             **rows,
         )
-        whole = (scene, building.status, building.message, building.provenance)
-        return cls(building, index, history, *whole, bearing, scene.modelled[index], float(scene.axial_loads[index]))
+        of_building = (scene, building.status, building.message, building.provenance)
+        return cls(
+            building, index, history, *of_building, bearing, scene.modelled[index], float(scene.axial_loads[index])
+        )
 
     @property
     def number(self) -> int:

@@ -363,15 +363,15 @@ def _reasons(bearing: Bearing, requested: Auto, remaining: float) -> tuple[Reaso
     capacity = min(surface.capacity for surface in bearing.surfaces)
     friction = select_friction(bearing, requested.friction_law)
     lifts = remaining <= LEAST_SHARE and requested.sliders != "massless"
-    left = f"about {max(remaining, 0.0):.0%} of the load at rest remains"
+    why = f"about {max(remaining, 0.0):.0%} of the load at rest remains"
     if remaining == -np.inf:
-        left = "the ground moves differently below some bearings, which may take the load off others"
+        why = "the ground moves differently below some bearings, which may take the load off others"
     saves = "" if lifts else f"{3 * bearing.layout.surfaces} unknown separations"
     return (
         Reason("dimension", "spatial", "the building moves a bearing in space"),
         Reason("sliders", "inertial", "quasi-static steps need motion in one vertical plane"),
         Reason("rims", True, f"nothing limits sliding under a building; the least capacity is {1e3 * capacity:.4g} mm"),
-        Reason("uplift", lifts, left, saves),
+        Reason("uplift", lifts, why, saves),
         Reason("friction", friction, "the parameters that its surfaces have"),
     )
 

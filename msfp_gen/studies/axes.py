@@ -325,10 +325,12 @@ def grid(axis: Axis, values: Any, labels: Any = None) -> Axis:
         raise InputError(f"labels = {_short(labels)}: give one for each of the {len(values)} values")
     labels = values if labels is None else labels
     if all(isinstance(label, int | float) and not isinstance(label, bool) for label in labels):
-        shown: tuple[Any, ...] = tuple(map(float, labels))
+        column_labels: tuple[Any, ...] = tuple(map(float, labels))
     else:
-        shown = tuple(str(label) if isinstance(label, str | int | float) else json.dumps(label) for label in labels)
-    return replace(axis, values=tuple(values), labels=shown)
+        column_labels = tuple(
+            str(label) if isinstance(label, str | int | float) else json.dumps(label) for label in labels
+        )
+    return replace(axis, values=tuple(values), labels=column_labels)
 
 
 def located(axis: Axis, folder: Path | None) -> Axis:

@@ -88,10 +88,10 @@ def variations(
         scene = with_absolute_paths(table if not records else {**table, "motion": motion_of(records[0].table)}, folder)
         factory = SceneFactory(Recipe(scene, tuple(axes), tables, {}, {}))
         scenes = []
-        for shown, values in zip(product(*lists), product(*(axis.values or () for axis in axes)), strict=True):
-            run, varied = factory.scene(values), {axis.name: value for axis, value in zip(axes, shown, strict=True)}
-            shown_values = [f"{field} = {value}" for field, value in varied.items()]
-            name = ", ".join([run.name or Path(source).stem, *shown_values])
+        for given, values in zip(product(*lists), product(*(axis.values or () for axis in axes)), strict=True):
+            run, varied = factory.scene(values), {axis.name: value for axis, value in zip(axes, given, strict=True)}
+            texts = [f"{field} = {value}" for field, value in varied.items()]
+            name = ", ".join([run.name or Path(source).stem, *texts])
             scenes.append(Variation(str(source), varied, replace(run, name=name)))
         return scenes
 
@@ -150,8 +150,10 @@ def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> 
 def sweep_table(rows: Sequence[Row]) -> Table:
     """The rows for a terminal, at most 80 characters wide; fields that do not fit are named in the title."""
     rows = sorted(rows)
-    every = dict.fromkeys(path for row in rows for path in row.variation.varied)
-    paths = [path for path in every if len(rows) == 1 or len({str(row.variation.varied.get(path)) for row in rows}) > 1]
+    fields = dict.fromkeys(path for row in rows for path in row.variation.varied)
+    paths = [
+        path for path in fields if len(rows) == 1 or len({str(row.variation.varied.get(path)) for row in rows}) > 1
+    ]
     scenes = {row.variation.source for row in rows}
     leading = {"no.": [str(row.number) for row in rows]}
     if len(scenes) > 1 or not paths:

@@ -380,9 +380,9 @@ def _points(study: Study) -> Table:
     for point in study.points:
         trial, known = point.trial, point.known_errors
         expected = f"{trial.seconds:.3g}" if trial.status != CUT_OFF else f"(about {trial.expected_seconds:.2g})"
-        shown = ["-" if (error := known[name]) is None else f"{error:.1e}" for name in ERRORS]
+        errors_shown = ["-" if (error := known[name]) is None else f"{error:.1e}" for name in ERRORS]
         outcome = "WRONG SUCCESS" if point.wrong else trial.status
-        cells.append((point.series, trial.setting, outcome, expected, str(trial.newton), *shown))
+        cells.append((point.series, trial.setting, outcome, expected, str(trial.newton), *errors_shown))
     return Table(f"{study.kind} of {study.scene.name or 'unnamed scene'}", HEADS, cells)
 
 

@@ -101,9 +101,9 @@ def ida(rows: Any, measure: str, demand: str, fractiles: Sequence[float] = FRACT
 def _fractile(values: Array, share: float) -> Array:
     """The fractile of every column of sorted rows, shape (columns,) (definition 2 of Hyndman and Fan, 1996)."""
     count = share * len(values)
-    whole = round(count)
-    if abs(count - whole) < 1e-9 * len(values):  # equal up to roundoff
-        return np.asarray(values[max(whole, 1) - 1 : whole + 1].mean(axis=0))
+    nearest = round(count)
+    if abs(count - nearest) < 1e-9 * len(values):  # equal up to roundoff
+        return np.asarray(values[max(nearest, 1) - 1 : nearest + 1].mean(axis=0))
     return np.asarray(values[ceil(count) - 1])
 
 

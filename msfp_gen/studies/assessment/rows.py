@@ -46,9 +46,9 @@ def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
     with readable_parts(folder):
         dataset = ds.dataset(parts, format=ds.ParquetFileFormat(default_fragment_scan_options=checked))
     check_columns(columns or (), dataset.schema.names)
-    wanted = None if columns is None else list(dict.fromkeys(["run", "status", *columns]))
+    names = None if columns is None else list(dict.fromkeys(["run", "status", *columns]))
     with readable_parts(folder):
-        rows = dataset.to_table(columns=wanted).to_pandas().sort_values("run", ignore_index=True)
+        rows = dataset.to_table(columns=names).to_pandas().sort_values("run", ignore_index=True)
     rows.attrs["chosen"] = "listed" in table.get("accuracy", {})
     rows.attrs["units"] = {field.name: (field.metadata or {}).get(b"units", b"").decode() for field in dataset.schema}
     return rows

@@ -415,13 +415,13 @@ def plot_bounds(bounds: Bounds, path: str | Path | None = None) -> Figure:
     A run that failed is drawn up to its last row; a run without rows is not drawn. Raises InputError for a path that
     cannot be written.
     """
-    drawn = [case for name in LINE_COLOURS for case in bounds.cases if case.name == name and case.result is not None]
-    axes = sorted({axis for case in drawn for axis in axes_along(_loop(case.result)[0])}) or [0]
+    plotted = [case for name in LINE_COLOURS for case in bounds.cases if case.name == name and case.result is not None]
+    axes = sorted({axis for case in plotted for axis in axes_along(_loop(case.result)[0])}) or [0]
     with page(6.4 * len(axes), 5.0, path, "bounds") as figure:
         name = next(case.scene.name for case in bounds.cases if case.name == "nominal") or "unnamed scene"
         headline(figure, f"{name}: bounds by {bounds.table.name}")
         for axis, place in zip(axes, figure.subplots(1, len(axes), squeeze=False)[0], strict=True):
-            _draw(place, bounds, drawn, axis)
+            _draw(place, bounds, plotted, axis)
     return figure
 
 

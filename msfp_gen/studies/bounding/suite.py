@@ -270,14 +270,14 @@ def plot_suite_bounds(bounds: SuiteBounds, path: str | Path | None = None) -> Fi
 
     Runs without a value are not drawn. Raises InputError for a path that cannot be written.
     """
-    drawn = [name for name in DRAWN if name in bounds.values and not np.isnan(bounds.values[name]).all()]
+    plotted = [name for name in DRAWN if name in bounds.values and not np.isnan(bounds.values[name]).all()]
     colours = distinct(len(bounds.records))
-    with page(3.4 * len(drawn) + 2.2, 4.4, path, "suite") as figure:
+    with page(3.4 * len(plotted) + 2.2, 4.4, path, "suite") as figure:
         headline(
             figure, f"{bounds.name or 'unnamed scene'}: {len(bounds.records)} records at bounds by {bounds.table.name}"
         )
-        row = figure.subplots(1, len(drawn), squeeze=False)[0]
-        for axes, name in zip(row, drawn, strict=True):
+        row = figure.subplots(1, len(plotted), squeeze=False)[0]
+        for axes, name in zip(row, plotted, strict=True):
             _draw(axes, bounds, name, colours)
         handles, labels = row[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside right center")

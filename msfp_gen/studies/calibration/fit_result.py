@@ -232,17 +232,17 @@ DRAWN = 24  # tests in a figure, at most: few programs open a larger picture
 
 def plot_fit(tests: Sequence[FittedTest], title: str = "fit", path: str | Path | None = None) -> Figure:
     """Measured and fitted loops of the first 24 tests, each above its residual over time. path: as of `page`."""
-    drawn, across = tests[:DRAWN], min(len(tests), ACROSS)
-    rows = -(-len(drawn) // across)
+    plotted, across = tests[:DRAWN], min(len(tests), ACROSS)
+    rows = -(-len(plotted) // across)
     with page(max(4.2 * across, 6.0), 6.4 * rows, path, "fit") as figure:
         first = f", the first {DRAWN} of them" if len(tests) > DRAWN else ""
         headline(figure, f"{title} of {len(tests)} test{'' if len(tests) == 1 else 's'}{first}")
         grid = figure.subplots(2 * rows, across, squeeze=False, height_ratios=(2, 1) * rows)
         pairs = [pair for row in range(rows) for pair in zip(grid[2 * row], grid[2 * row + 1], strict=True)]
-        for loop, below in pairs[len(drawn) :]:
+        for loop, below in pairs[len(plotted) :]:
             loop.remove()
             below.remove()
-        for test, (loop, below) in zip(drawn, pairs, strict=False):
+        for test, (loop, below) in zip(plotted, pairs, strict=False):
             _draw_test(test, loop, below)
     return figure
 

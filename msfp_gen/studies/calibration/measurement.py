@@ -160,9 +160,9 @@ def _number(lines: Lines, index: int, column: str, text: str) -> float:
 
 def _place(lines: Lines, head: int, header: list[str], name: str, column: str) -> tuple[int, float]:
     """(index of a column in the header, factor of its unit to SI). Raises InputError."""
-    wanted, unit = _split(column)
+    column_name, unit = _split(column)
     places = [i for i, text in enumerate(header) if text.lower() == column.strip().lower()]
-    places = places or [i for i, text in enumerate(header) if _split(text)[0].lower() == wanted.lower()]
+    places = places or [i for i, text in enumerate(header) if _split(text)[0].lower() == column_name.lower()]
     if len(places) != 1:
         what = "no column" if not places else f"{len(places)} columns"
         names = ", ".join(repr(text[:24]) for text in header[:12])
@@ -170,7 +170,8 @@ def _place(lines: Lines, head: int, header: list[str], name: str, column: str) -
     unit = unit or _split(header[places[0]])[1]
     if not unit:
         lines.fail(
-            head, f"column {header[places[0]]!r} has no unit; write {wanted} [{UNITS[name]}], here or in the columns"
+            head,
+            f"column {header[places[0]]!r} has no unit; write {column_name} [{UNITS[name]}], here or in the columns",
         )
     try:
         return places[0], to_si(f"1 {unit}", UNITS[name])
