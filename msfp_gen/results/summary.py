@@ -143,7 +143,7 @@ def summarise(result: RunData) -> dict[str, Any]:
 
 def summary_of_run(result: ResultFiles, time: Array, counters: Mapping[str, int], wall_time: float) -> dict[str, Any]:
     """The part of a summary that bearings and buildings have: name, how the run ended, its duration and its work."""
-    duration = float(time[-1] - time[0])
+    duration = float(result.scene.end if result.status == "ok" else time[-1])  # rows may end before a complete run
     return {
         "name": result.scene.name,
         "status": result.status,

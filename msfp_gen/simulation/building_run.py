@@ -27,6 +27,7 @@ from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.scene.effect_switching import Ending, monitor_options, next_effects, stopping_monitors
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
+from msfp_gen.scene.standing import seat_stiffness
 from msfp_gen.simulation.start import RestartState, transferred_heights, transferred_state
 from msfp_gen.specification.contract import WORKS, names
 from msfp_gen.specification.layout import Auto, Effects
@@ -358,10 +359,15 @@ def result_of(run: BuildingRun) -> BuildingResult:
 
 def _stored(run: BuildingRun, rows: dict[str, Array], index: int) -> Array:
     """Energy of a bearing and of the springs of its interface, less that in friction, shape (k,) [J]."""
-    upper, interface = rows[f"wrench {index}"][:, 1], run.scene.bearings[index].interface
+    upper, mount = rows[f"wrench {index}"][:, 1], run.scene.bearings[index]
+    interface = mount.interface
     stiffness = [interface.stiffness, interface.stiffness, interface.vertical_stiffness]
     stiffness += 2 * [interface.rotational_stiffness]
     energy: Array = 0.5 * (upper[:, :5] ** 2 / stiffness).sum(axis=1)
+    if run.members[index].effects.uplift:  # the stiffness of the interface contains the contacts: docs/uplift.md
+        opening = (change.rows for change in run.changes if change.bearing == index and "uplift" in change.effects)
+        since, compliance = next(opening, 0), (1.0 / seat_stiffness(mount.bearing, interface)).sum()
+        energy[since:] -= 0.5 * compliance * (upper[since:, :3] ** 2).sum(axis=1)
     for name in ("kinetic", "potential", "rim_stored", "seat_stored"):
         energy = energy + rows[f"{name} {index}"]
     return energy

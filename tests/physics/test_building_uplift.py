@@ -20,6 +20,7 @@ from msfp_gen import (
     simulate,
 )
 from msfp_gen.buildings import scene as selection
+from msfp_gen.buildings.result import BuildingResult
 
 LIFTING = Effects(uplift=True)
 
@@ -30,6 +31,16 @@ def sunk(depth: float, end: float) -> Motion:
     path = np.zeros((401, 3))
     path[:, 2] = -depth * np.sin(np.pi * time / end) ** 4
     return Motion.from_arrays(time, path)
+
+
+def test_contacts_that_stay_closed_store_no_more_than_the_spring_that_contains_them():
+    def run(effects: Effects) -> BuildingResult:
+        given = replace(scene(frame()), duration=0.5)
+        return simulate(replace(given, bearings=[replace(mount, effects=effects) for mount in given.bearings]))
+
+    closed, seated = run(Effects(rims=False)), run(Effects(rims=False, uplift=True))
+    assert not np.nan_to_num(seated.lift).any()
+    assert seated.stored == pytest.approx(closed.stored, rel=1e-3)
 
 
 def test_a_bearing_whose_support_sinks_lifts_off_and_lands():

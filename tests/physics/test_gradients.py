@@ -42,7 +42,7 @@ STATE = ("initial_state.q[0][0]", "initial_state.q[1][1]", "initial_state.v[1][1
 WEAK = ("contact_damping", "mass", "centroid", "gravity", "stiffness", "damping", "rotational_stiffness",
         "rotational_damping")  # fmt: skip
 CHECKED = ("tilt_angles", "tilt_rates", "friction_state", "normal_force", "top_force", "top_moment", "displacement",
-           *ENERGY)  # fmt: skip
+           "square_of_sliding", *ENERGY)  # fmt: skip
 # A term may be small beside the others: the energies of a state, and the closing error, which all of them determine.
 TOGETHER = dict.fromkeys(ENERGIES, ENERGIES) | {"numerical": tuple(ENERGY)}
 ROUNDING = {"top_dissipated": 4e-10}
@@ -71,6 +71,9 @@ class FrozenSteps:
         rows = run.gradient_rows(len(parameters))
         found = [unpacked(self.model, each, azimuth, True) for each in (run.rows, *np.moveaxis(rows, 1, 0))]
         values, *slopes = [fields | fields["energy"] for fields in found]
+        for slope in slopes:  # sliding has a kink at the centre
+            slope["square_of_sliding"] = 2 * values["sliding"] * slope["sliding"]
+        values["square_of_sliding"] = values["sliding"] ** 2
         return values, slopes[: len(parameters)]
 
     def differences(self, parameter: Parameter, step: float) -> dict[str, Array]:

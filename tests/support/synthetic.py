@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -106,7 +107,7 @@ def loops(both: bool = False, name: str = "fenz-test5") -> Result:
     rows = history(u, force, sliding, duration=20.0)
     met = tuple(contact(rows, surface) for surface in (1, 4))
     counters = Counters(steps=2000, newton_iterations=9000, wall_time=0.25)
-    return Result(scene(name), rows, met, counters, provenance={"version": "0"})
+    return Result(replace(scene(name), duration=20.0), rows, met, counters, provenance={"version": "0"})
 
 
 def opened(path: Path, group: str | None = None) -> xr.Dataset:

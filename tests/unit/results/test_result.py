@@ -13,6 +13,7 @@ from support import thinned
 from support.buildings import pushed
 from support.synthetic import LOAD, history, loops, opened, ramp, scene
 
+from msfp_gen import Load, load_scene, simulate
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.history import ENERGY, Counters, quantities
@@ -184,6 +185,11 @@ def test_summary_knows_the_answers():
     assert "transitions" not in summary
 
 
+def test_the_duration_of_a_run_does_not_depend_on_its_rows():
+    result = simulate(dataclasses.replace(load_scene("fenz-test2"), output_step=10.0))
+    assert result.history.time[-1] == 50.0 and result.summary["duration"] == result.scene.end == 56.25
+
+
 def test_summary_is_json():
     for result in (loops(both=True), ramp(), still()):
         assert json.loads(json.dumps(result.summary, allow_nan=False)) == result.summary
@@ -217,6 +223,16 @@ def test_axial_load_of_every_top(top, load):
     result = dataclasses.replace(result, scene=dataclasses.replace(result.scene, top=top))
     assert result.summary["axial_load"] == pytest.approx(load)
     assert (result.summary["peak_force_ratio"] is None) == (load is None)
+
+
+@pytest.mark.parametrize(("forces", "load"), [((-2e3, -2e3), 7e3), ((2e3, 2e3), 3e3), ((-2e3, 0.0), None)])
+def test_the_axial_load_includes_a_constant_vertical_load(forces, load):
+    result = still()
+    vertical = Load.from_arrays(
+        [0.0, 0.5 * result.scene.end, result.scene.end], [[1.0, 2.0, forces[i]] for i in (0, 1, 1)]
+    )
+    scene = dataclasses.replace(result.scene, top=Top.rig(axial_load=5e3, stiffness=1.0), load=vertical)
+    assert dataclasses.replace(result, scene=scene).axial_load == load
 
 
 def test_no_time_taken_is_no_infinite_speed():

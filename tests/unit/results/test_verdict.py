@@ -35,7 +35,7 @@ from msfp_gen.common.identity import fingerprint
 from msfp_gen.results.history import Event
 from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, merged, openings
-from msfp_gen.results.verdict import LIMITS, RIM_SHARE
+from msfp_gen.results.verdict import LIMITS, RIM_SHARE, Reading, Value
 
 OPENING = 3e-3  # [m]
 GIVEN = [limit.key for limit in LIMITS if limit.key in {field.name for field in fields(Limits)}]
@@ -423,3 +423,9 @@ def test_explain_has_the_limits_that_are_given(given: Scene | BuildingScene) -> 
         "displacement",
     ]
     assert tables[0].rows[0][1] == "12000 N" and not [t for t in explain(given) if "limits" in t.title]
+
+
+def test_what_a_limit_of_zero_does_not_allow_governs() -> None:
+    value = Value(1, 0.0, 0.0, 0.0)
+    shares = [Reading(LIMITS[0], 0, "", value._replace(reached=reached)).share for reached in (0.0, 1e-6, 2.0)]
+    assert shares == [0.0, np.inf, np.inf]

@@ -25,6 +25,7 @@ from msfp_gen import (
     simulate,
 )
 from msfp_gen.buildings.explain import explain
+from msfp_gen.model.model import build_model
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.results.result import Result
 from msfp_gen.scene import effect_switching
@@ -36,7 +37,7 @@ from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation import simulate as simulation
 from msfp_gen.simulation.simulate import RunSequence
-from msfp_gen.simulation.start import RestartState
+from msfp_gen.simulation.start import RestartState, start_run
 
 FULL = Effects()
 STILL = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, ORDER)))
@@ -391,6 +392,22 @@ def test_positions_and_friction_are_carried_over_exactly() -> None:
     alone = simulate(replace(scene, effects=Auto(friction="pv")))
     for name in ("tilt_angles", "friction_state", "tilt_rates"):
         np.testing.assert_array_equal(getattr(result.history, name)[: row + 1], getattr(alone.history, name)[: row + 1])
+
+
+def test_a_state_has_the_rotation_of_the_base_and_what_the_surfaces_remember() -> None:
+    turned = Motion.harmonic(0.05, 0.5).rocking(Rotation.harmonic(0.01, 0.02, frequency=0.3, cycles=1.0))
+    scene = replace(load_scene("fenz-test2"), motion=turned, motion_table=None, duration=1.0, effects=FULL)
+    model = build_model(scene.bearing.layout, scene.modelled)
+    run, azimuth = start_run(scene, model, scene.effect_selection, scene.end, None, ())
+    run.advance(20)
+    state = RestartState.of(model, run, azimuth)
+    assert (
+        state.base_angles == pytest.approx(scene.motion.rotation(state.time))
+        and np.abs(state.base_angles[:2]).min() > 0
+    )
+    memory, of_heat = np.ones((4, 2)), Effects(friction="pvt").law
+    assert state.memory_of(FULL.law) is None and state.memory_of(of_heat) is state.monitor_heat
+    assert replace(state, memory=memory).memory_of(of_heat) is memory
 
 
 def test_energies_go_on_over_a_change_of_models() -> None:
