@@ -194,8 +194,9 @@ def _quantities(scene: AnyScene) -> dict[str, Source]:
 
 
 def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
-    """Tables of statistics of the bearing or building as a whole, of quantities without a mean, and of runs that
-    exceeded limits, met the stop condition, or failed. `write_statistics` writes the statistics of parts too.
+    """Tables of statistics, of quantities without a mean, and of runs that exceeded limits, were stopped, or failed.
+
+    The statistics are of the bearing or building as a whole; `write_statistics` writes those of its parts too.
     """
     rows = []
     for statistic in bounds.statistics:
