@@ -355,6 +355,7 @@ _ROW = (
     Recorded("slip", (_N, 2), "m/s", "slip velocity u~, v~ (2.98)"),
     Recorded("compression", (_N,), "m", "compression of the unilateral contact; negative: open", "uplift"),
     Recorded("base", (3,), "m", "displacement of the base"),
+    Recorded("base_angles", (3,), "rad", "angles psi, theta, phi of the base"),
     Recorded("top", (3,), "m", "position of r_nn at the top plate"),
     Recorded("top_force", (3,), "N", "force of the bearing on the top support"),
     Recorded("top_moment", (3,), "N m", "moment of the bearing on the top support at r_nn"),

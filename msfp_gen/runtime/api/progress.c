@@ -43,7 +43,7 @@ void msfp_api_run_state(const msfp_run *run, msfp_run_state *state)
     const msfp_row *last = run->row_count ? &run->rows[run->row_count - 1] : &none;
     give(state->force, last->force, sizeof last->force);
     give(state->rim_force, last->rim, sizeof last->rim);
-    give(state->base_angles, last->base + 3, 3 * sizeof *last->base);
+    give(state->base_angles, last->base_angles, sizeof last->base_angles);
     give(state->origin, run->start, sizeof run->start);
     give(state->monitor_heat, run->monitor.heat, sizeof run->monitor.heat);
 }

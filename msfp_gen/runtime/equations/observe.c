@@ -128,6 +128,7 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
 #endif
     }
     memcpy(row->base, at->base[0], sizeof row->base);
+    memcpy(row->base_angles, at->base[0] + 3, sizeof row->base_angles);
     msfp_body_C_get(w->body[NB], row->top);
     row->top[1] += MSFP_PLANAR ? at->base[0][1] : 0.0;
     msfp_force_F_get(w->force[NB], row->top_force);

@@ -209,6 +209,7 @@ MSFP_WIDE void msfp_record_columns(const msfp_parameters *p, const msfp_paramete
         surface_columns(p, dp, w, d, j, row);
     }
     memcpy(row + MSFP_ROW_BASE, dat->base[0], 3 * sizeof *row);
+    memcpy(row + MSFP_ROW_BASE_ANGLES, dat->base[0] + 3, 3 * sizeof *row);
     msfp_get_polar(d->body[NB] + MSFP_BODY_CX * C, row + MSFP_ROW_TOP);
     if (MSFP_PLANAR)
         memcpy(row[MSFP_ROW_TOP + 1], dat->base[0][1], sizeof *row);

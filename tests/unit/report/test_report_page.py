@@ -250,7 +250,7 @@ def test_motion_from_python_or_a_file_comes_back_without_its_file(tmp_path):
     motion = Motion.from_csv(table)
     recipe = {"kind": "arrays", "file": str(table)}
     for given in (recipe, None):
-        scene = dataclasses.replace(loops().scene, motion=motion, motion_table=given)
+        scene = dataclasses.replace(loops().scene, motion=motion, motion_table=given, duration=None)
         path = dataclasses.replace(loops(), scene=scene).to_netcdf(tmp_path / "run.nc")
         table.unlink(missing_ok=True)
         assert Result.from_netcdf(path).scene == scene
