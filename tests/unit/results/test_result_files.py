@@ -12,13 +12,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from support import preset_run
+from support import preset_run, scene_of
 from support.damaged_records import cut, flip, remove
 from support.damaged_results import forge, virtual
 
-from msfp_gen import InputError, Motion
+from msfp_gen import InputError, Motion, simulate
 from msfp_gen.cli import main
 from msfp_gen.results.result import Result
+from msfp_gen.scene.scene_fields import Stop
 
 COUNTS = [150, pytest.param(5000, marks=pytest.mark.slow)]
 
@@ -192,6 +193,13 @@ def test_what_others_add_does_not_matter(copy: Path, saved: Path) -> None:
         file.attrs["history"] = "made larger"
         file["mine"] = np.zeros((3, 3))
     assert Result.from_netcdf(copy).dataset.identical(Result.from_netcdf(saved).dataset)
+
+
+def test_the_event_of_a_stop_is_of_no_surface(tmp_path: Path) -> None:
+    stopped = simulate(scene_of("fenz-test2", duration=10.0, stop=Stop(displacement=0.005)))
+    assert stopped.status == "stopped" and [(event.kind, event.surface) for event in stopped.events] == [("stop", 0)]
+    (event,) = Result.from_netcdf(stopped.to_netcdf(tmp_path / "stopped.nc")).events
+    assert (event.kind, event.surface, event.time) == ("stop", 0, stopped.events[0].time)
 
 
 def test_a_command_says_it_in_one_line(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -32,8 +32,9 @@ from msfp_gen import (
 from msfp_gen.model.compiled import bodies_and_surfaces, top_values
 from msfp_gen.model.model import build_model
 from msfp_gen.results.history import Extremes
+from msfp_gen.scene.effect_selection import slider_period
 from msfp_gen.scene.parameters import changed_parameters, parameters_of
-from msfp_gen.simulation.gradients import measured_errors, start_gradients, with_gradient_errors
+from msfp_gen.simulation.gradients import RESOLVED_SHARE, measured_errors, start_gradients, with_gradient_errors
 from msfp_gen.simulation.simulate import RunSequence
 from msfp_gen.simulation.start import start_slopes, state_at_rest
 
@@ -326,6 +327,8 @@ def test_undamped_ringing_is_noted_and_refused_where_it_is_resolved() -> None:
     assert "give contact_damping = 1e-4" in note.text
     with pytest.raises(InputError, match=r"resolves the undamped ringing .*give contact_damping = 1e-4"):
         simulate(replace(scene, solver=replace(scene.solver, max_step=2e-4)), gradients=PATHS)
+    above = replace(scene, solver=replace(scene.solver, max_step=1.2 * RESOLVED_SHARE * slider_period(scene)))
+    assert [note.kind for note in simulate(replace(above, duration=0.05), gradients=PATHS).notes] == ["ringing"]
 
 
 def contact(damping: float = 1e-3) -> Scene:
