@@ -131,7 +131,7 @@ def test_run_prints_tables_and_writes_what_was_asked_for(capsys, simulated, tmp_
     data, picture = tmp_path / "run.nc", tmp_path / "run.png"
     assert main(["run", "fenz-test5", "-o", str(data), "--plot", str(picture)]) == 0
     out, err = capsys.readouterr()
-    assert "fenz-test5" in out and "E1 140" in out and "80 times real time" in out
+    assert "fenz-test5" in out and "E1 140" in out and "1250 times real time" in out
     surface = next(line.split() for line in out.splitlines() if line.split()[:1] == ["4"])
     assert surface == ["4", "65.10", "65.00", "-0.10", "yes", "112.000", "112.000"]
     assert err == f"wrote {data}\nwrote {picture}\n"
