@@ -31,6 +31,8 @@ def test_figures_of_a_building_state_the_peaks_of_the_summary():
     plan, ranges, *_, shears = figure.get_axes()
     own = [one.summary["peak_displacement"]["radial"] for one in result.bearings]
     assert [text.get_text().split(": ")[1] for text in plan.texts] == [f"{1e3 * each:.0f} mm" for each in own]
+    figure.draw_without_rendering()
+    assert all(plan.bbox.contains(*text.get_window_extent().p0) for text in plan.texts), "none is cut off"
     crosses = [line.get_xdata()[0] for line in shears.get_lines() if line.get_marker() == "x" and len(line.get_xdata())]
     assert crosses == pytest.approx([summary["peak_force"][axis] / weight for axis in ("E1", "E2")])
     for axes in (ranges, plot_axial_forces(result).get_axes()[1]):
