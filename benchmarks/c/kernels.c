@@ -116,9 +116,9 @@ int main(int argc, char **argv)
         memcpy(at.v[k], state[1][k], sizeof state[1][k]);
         memcpy(at.a[k], state[2][k], sizeof state[2][k]);
     }
-    seed.cq = seed.beta = head[0];
-    seed.cv = 1.0;
-    seed.ca = 1.0 / head[0];
+    seed.q_weight = seed.beta = head[0];
+    seed.v_weight = 1.0;
+    seed.a_weight = 1.0 / head[0];
     seed.accuracy = 1e-8;
     memcpy(seed.fp, at.f, sizeof seed.fp);
     int (*const all[])(void) = { value, tangents, newton, accelerations };
