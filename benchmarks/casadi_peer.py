@@ -143,7 +143,7 @@ class Stack:
                 x=xs[j + 1],
                 y=xs[j],
                 tot=forces[j],
-                rim={"Fx": 0.0, "Fy": 0.0, "Fz": 0.0},
+                rim={"fx": 0.0, "fy": 0.0, "fz": 0.0},
             )
             touch = results(run["contact"], ca, par=par, h=stage, loc=local, g=own)
             moments.insert(0, results(run["moment_to_world"], ca, b=bodies[j], loc={k: touch[k] for k in none}))

@@ -150,7 +150,7 @@ def numbers(scene: Scene, state: State) -> dict[tuple[str, int, str], float]:
         values = dict.fromkeys(("rs", "pr", "ks", "cs", "ca", "sa"), 0.0) | {"sign": sign}  # rims are left out
         values |= dict(zip(SURFACE_SYMBOLS, state.surfaces[k - 1], strict=True))
         out |= {("surface_parameters", k - 1, name): value for name, value in values.items()}
-    values = dict(zip(TOP_SYMBOLS, state.top, strict=True)) | {"g": g, "mz": state.top[6], "x0z": 0.0}
+    values = dict(zip(TOP_SYMBOLS, state.top, strict=True)) | {"g": g, "mz": state.top[6], "x0z": 0.0, "sr": 1.0}
     return out | {("top_parameters", 0, name): value for name, value in values.items()}
 
 
