@@ -292,7 +292,7 @@ def main_regime(backbone: Backbone) -> tuple[float, float, float]:
     """
     u, force = backbone.points
     slopes = np.diff(force) / np.diff(u)
-    main = int(np.flatnonzero(slopes <= slopes.min() * (1 + EQUAL))[0])
+    main = int(np.argmax(slopes <= slopes.min() + EQUAL * abs(slopes.min())))
     slope = float(slopes[main])
     friction = float(force[main] - slope * u[main])
     missing = friction + slope * u[: main + 1] - force[: main + 1]

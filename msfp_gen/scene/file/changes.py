@@ -17,7 +17,7 @@ Table = dict[str, Any]
 Key = str | int | None  # of a table, of a list, of all rows of a list
 _STEP = re.compile(r"([^\[\].]+)((?:\[(?:\d+|\*)\])*)")
 COMMON = ("interface", "soil", "effects")  # tables of [building] for all bearings that have none of their own
-NONE: Mapping[str, Any] = MappingProxyType({})
+NO_TABLES: Mapping[str, Any] = MappingProxyType({})
 ROWS = {"surfaces": Surface, "bodies": Body}
 _COLUMNS = {  # a field of surfaces or bodies -> their list, and whether one value is a list of numbers
     name: (rows, isinstance(rule, Quantity) and bool(rule.shape))
@@ -99,7 +99,7 @@ def _places(walk: _Walk, path: str) -> Iterator[_Place]:
     return _inner_places(walk, walk.root, keys)
 
 
-def _inner_places(walk: _Walk, inner: Any, keys: list[Key], common: Mapping[str, Any] = NONE) -> Iterator[_Place]:
+def _inner_places(walk: _Walk, inner: Any, keys: list[Key], common: Mapping[str, Any] = NO_TABLES) -> Iterator[_Place]:
     """The places to which keys lead from `inner`, which is a copy, as all that they lead through becomes one.
 
     common: the tables that bearings of a building have where they have none of their own.

@@ -164,7 +164,7 @@ def parallel(backbone: Backbone) -> tuple[Array, float, Array]:
     """
     u, force = backbone.points
     slopes = np.diff(force) / np.diff(u)
-    rising = np.append(np.diff(slopes) > slopes[:-1] * EQUAL, True)
+    rising = np.append(np.diff(slopes) > EQUAL * np.abs(slopes[:-1]), True)
     last = int(np.flatnonzero(rising)[0])  # regime before the slope rises
     stiffness = -np.diff(slopes[: last + 1])
     yields = u[1 : last + 1]
