@@ -15,7 +15,7 @@ LINKED = {"generator", "templates"}  # the same folders again, under their impor
 PACKAGE = sorted(p for p in (ROOT / "msfp_gen").rglob("*.py") if not LINKED & set(p.relative_to(ROOT).parts))
 CONSOLE = ROOT / "msfp_gen" / "cli" / "console.py"
 GENERATOR = sorted((ROOT / "generator").glob("*.py"))
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 # The packages and the modules beside them, lowest first: each imports only itself and what stands before it.
 ORDER = (
