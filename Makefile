@@ -9,6 +9,7 @@ ZIG    := $(VENV)/.zig
 PEERS  := $(VENV)/.peers
 # uv installs in a tenth of the time that pip takes; where there is none for a machine, pip does.
 install = $(BIN)/uv pip install -q --python $(BIN)/python -e "$(1)" || $(BIN)/python -m pip install -q --disable-pip-version-check -e "$(1)"
+comma := ,
 # Hundreds of processes of the tests import the same modules: they are compiled once, also where images forbid it.
 export PYTHONDONTWRITEBYTECODE :=
 
@@ -35,9 +36,10 @@ types: $(STAMP)
 analyse: $(STAMP)
 	$(BIN)/python tools/analyse.py
 
-# Lines of Python and C that the tests of the physics run: docs/coverage.md. Needs gcc and its gcov.
+# Lines of Python and C that the tests of units and physics run: pages in build/coverage. Hours; needs gcc and its gcov.
 coverage: $(STAMP)
-	$(BIN)/python benchmarks/line_coverage.py
+	$(call install,.[test$(comma)coverage])
+	tests/coverage.sh
 
 # The sdist and the wheel, each built, installed and run outside the checkout.
 package: $(STAMP)
@@ -65,12 +67,12 @@ zig: $(ZIG)
 
 # Random scenes against each other: half an hour. See docs/stability.md.
 fuzz: $(STAMP)
-	$(BIN)/python benchmarks/fuzz.py --scenes 10000 --seed 1
-	$(BIN)/python benchmarks/fuzz.py --combined --scenes 2000 --seed 127 --check 0
+	$(BIN)/python tools/fuzz.py --scenes 10000 --seed 1
+	$(BIN)/python tools/fuzz.py --combined --scenes 2000 --seed 127 --check 0
 
-# A hundred small changes of the code, and whether the tests see them: hours. See benchmarks/mutants.py.
+# A hundred small changes of the code, and whether the tests see them: hours. See tools/mutants.py.
 mutants: $(STAMP)
-	$(BIN)/python benchmarks/mutants.py --count 100 --output build/mutants.json
+	$(BIN)/python tools/mutants.py --count 100 --output build/mutants.json
 
 figures: $(STAMP)
 	$(BIN)/python benchmarks/report_figures.py

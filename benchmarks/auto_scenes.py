@@ -5,14 +5,18 @@ Scene number i of a seed is always the same, on every machine.
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, replace
 from math import pi
+from pathlib import Path
 
 import numpy as np
-from fuzz_scenes import GRAVITY, Draw, noise, reach
 
 from msfp_gen import Auto, Bearing, Load, Motion, Scene, Solver, Top, presets
 from msfp_gen.motions.records import bundled
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tools"))
+from fuzz_scenes import GRAVITY, Draw, noise, reach
 
 BEARINGS = (
     "single-fp",

@@ -1,4 +1,4 @@
-"""The fuzz campaign in a short version; `python benchmarks/fuzz.py` is the whole of it, docs/stability.md its table."""
+"""The fuzz campaign in a short version; `python tools/fuzz.py` is the whole of it (docs/stability.md)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from msfp_gen.results.result import Result
 @pytest.fixture(scope="module")
 def short() -> dict[str, Any]:
     """45 scenes of a few models, two of them held against the second method."""
-    command = [sys.executable, str(ROOT / "benchmarks" / "fuzz.py"), "--scenes", "45", "--seed", "7", "--check", "2"]
+    command = [sys.executable, str(ROOT / "tools" / "fuzz.py"), "--scenes", "45", "--seed", "7", "--check", "2"]
     done = subprocess.run([*command, "--short"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     found: dict[str, Any] = json.loads(done.stdout)
@@ -40,7 +40,7 @@ def test_every_scene_ends_right_or_with_a_name(short: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 def test_the_campaign(tmp_path: Path) -> None:
-    """Another seed than that of the page; minutes."""
+    """Another seed than that of `make fuzz`; minutes."""
     assert fuzz.main(["--scenes", "10000", "--seed", "2", "--output", str(tmp_path / "table.json")]) == 0
 
 

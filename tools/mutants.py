@@ -1,6 +1,6 @@
 """A round of mutants: one small change of the code each, and whether the tests see it.
 
-    python benchmarks/mutants.py --count 100 --seed 1
+    python tools/mutants.py --count 100 --seed 1
 
 Mutants are drawn evenly from the parts of PARTS: generator, runtime (C), simulation and results. Each is made in a copy
 of the checkout. First the test files run that import the changed module, or those of CHOSEN for its folder or file, then
@@ -28,6 +28,7 @@ from dataclasses import asdict, dataclass
 from fnmatch import fnmatch
 from pathlib import Path
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from quick import QUICK, parser, pick
 
 ROOT = Path(__file__).parents[1]

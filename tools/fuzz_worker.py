@@ -10,6 +10,7 @@ import resource
 import sys
 import time
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,13 @@ from fuzz_balance import verified
 from fuzz_combined import case as combined_case
 from fuzz_scenes import case, load_of, sensible
 from fuzz_second import Second
-from quick import parser
 
 from msfp_gen import InputError, RunError, Scene, simulate
 from msfp_gen.results.result import Result
 from msfp_gen.scene.top import MassTop
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from quick import parser
 
 MEMORY = 4 << 30  # memory limit [bytes]; a run that needs more ends with a named failure
 ROWS = 8  # rows of a run that the second method repeats

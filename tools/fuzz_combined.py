@@ -1,4 +1,4 @@
-"""Random combinations of the public constructors, for the campaign `python benchmarks/fuzz.py --combined`.
+"""Random combinations of the public constructors, for the campaign `python tools/fuzz.py --combined`.
 
 Sums of histories, pieces, uneven sampling, jumps at starts and ends, records with baseline errors, tops with moments and
 springs, extreme friction laws, displaced states, stops, stacks of 12 and more bodies, scenes through TOML with units, and

@@ -1,11 +1,10 @@
 """The fuzz campaign of docs/stability.md: random valid scenes, run in a process that can be killed.
 
-    python benchmarks/fuzz.py --scenes 10000 --seed 1
+    python tools/fuzz.py --scenes 10000 --seed 1
 
 Every run must end correctly or with a named failure: without values that are not finite, crashes or hangs, and without a
 success that contradicts the energy balance, the friction disc or a second method (fuzz_second.py). The exit code is 1
-otherwise, or if at least a thousandth of the sensible scenes fails. --output writes the table to a JSON file, from which
-fuzz_page.py fills the page.
+otherwise, or if at least a thousandth of the sensible scenes fails. --output writes the table to a JSON file.
 """
 
 from __future__ import annotations
@@ -23,10 +22,12 @@ from typing import Any
 
 from fuzz_combined import COMBINED
 from fuzz_scenes import SHORT, SPECS
-from quick import parser, pick
 from rich.progress import track
 
 from msfp_gen import Effects, Layout, build_model
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from quick import parser, pick
 
 HERE = Path(__file__).parent
 LIMIT = 120.0  # wall time of one scene [s]; a hundred times that of most scenes, ten times that of the slowest
