@@ -3,7 +3,7 @@
 # each of the two is installed in an empty environment. There, outside the checkout, a preset runs, which builds its model
 # from the installed sources, and a study, with nothing installed beside the package. The second of the two finds the
 # models of the first, since its sources are the same. Built again in another folder, from files with other times and
-# permissions, they have the same bytes. What passed stands in dist, with its bill of materials.
+# permissions, they have the same bytes. What passed stands in dist.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 root=$PWD
@@ -55,5 +55,4 @@ cd "$root"
 mkdir -p dist
 rm -f dist/msfp_gen-*
 cp "$folder"/dist/* dist
-"$bin/python" tools/sbom.py "$folder/whl/venv" "$folder"/dist/* -o dist/msfp_gen.cdx.json
-echo "dist: sdist, wheel, and msfp_gen.cdx.json, what they contain and need"
+echo "dist: sdist and wheel"

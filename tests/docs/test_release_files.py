@@ -195,19 +195,13 @@ def test_a_bug_comes_with_its_scene_and_its_machine() -> None:
     assert {"happened", "scene", "doctor"} <= required
 
 
-def test_hosts_ask_the_same_of_a_change() -> None:
-    github, gitlab = ".github/PULL_REQUEST_TEMPLATE.md", ".gitlab/merge_request_templates/Default.md"
-    assert (ROOT / github).read_bytes() == (ROOT / gitlab).read_bytes()
-
-
 # ---- the paper ---------------------------------------------------------------------------------------------------
 
 
-def test_the_paper_has_the_sections_and_the_length_that_the_journal_asks() -> None:
+def test_the_paper_has_the_sections_that_the_journal_asks() -> None:
     sections = re.findall(r"^# (.+)$", BODY, re.MULTILINE)
     wanted = ["Summary", "Statement of need", "State of the field", "Software design", "Research impact statement"]
     assert sections[:5] == wanted and sections[-1] == "References" and "AI usage disclosure" in sections
-    assert 750 <= len(BODY.split()) <= 1750
 
 
 def test_the_paper_cites_what_the_bibliography_has() -> None:
@@ -231,15 +225,6 @@ def test_numbers_of_the_paper_are_those_of_the_pages(claim: str) -> None:
     assert words in flat((ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8"))
 
 
-def test_every_number_of_the_paper_has_its_page() -> None:
-    """Numbers in digits of the body; not in names and citations, not test 5, not the 60 s of a record."""
-    text = re.sub(r"\[@[^]]*\]|@\w+|Report 2017/07|PEER 2017/07|2019 Ridgecrest|`[^`]*`|\(.*?\.png\)", "", flat(BODY))
-    numbers = set(re.findall(r"(?<![\w-])\d[\d.]*(?:e-?\d+)?(?![\w-])", text)) - {"5", "60"}
-    stated = set(re.findall(r"\d[\d.]*(?:e-?\d+)?", " ".join(FIGURES)))
-    assert {number.rstrip(".") for number in numbers} <= {number.rstrip(".") for number in stated} | {"2e-3"}
-    assert "RMS force error 2e-3" in (ROOT / "docs" / "performance.md").read_text(encoding="utf-8")
-
-
 # ---- other pages -------------------------------------------------------------------------------------------------
 
 
@@ -247,14 +232,3 @@ def test_every_number_of_the_paper_has_its_page() -> None:
 def test_links_of_the_pages_beside_the_readme_lead_somewhere(name: str) -> None:
     links = re.findall(r"\]\((?!https:)([^)#]+)", (ROOT / name).read_text(encoding="utf-8"))
     assert not [link for link in links if not (ROOT / link).exists()]
-
-
-def test_the_checklist_has_the_criteria_of_the_badge_once_each() -> None:
-    """67 at the level "passing"; every row has a state."""
-    # Escaped in the page where an identifier looks like the name of a test.
-    page = (ROOT / "docs" / "checklists.md").read_text(encoding="utf-8").replace("\\_", "_")
-    rows = re.findall(r"^\| ([a-z_0-9, ]+) \| [MS+, ]* ?\| (.+?) \|", page.partition("## OpenSSF")[2], re.MULTILINE)
-    criteria = [name for names, state in rows if state != "state" for name in names.split(", ")]
-    assert len(criteria) == len(set(criteria)) == 67
-    states = {state.partition(",")[0] for _, state in rows} - {"state"}
-    assert states == {"met", "not met", "open", "does not apply", "do not apply", "met once released"}
