@@ -244,7 +244,7 @@ MEANINGS = {
     "building.soil.mass": "Not modelled: giving it is an error.",
     "displacement": "Horizontal displacement across the bearing.",
     "limits.rim_force": "Of a rim; without it a third of the axial load at rest, or of the largest N where it varies.",
-    "limits.rim_compression": "Of a rim; without it none.",
+    "limits.rim_compression": "Of a rim; without it a tenth of the capacity of its surface.",
     "limits.uplift_height": "Clearance between the faces of a surface; without it the `rim_offset` of its slider.",
     "limits.uplift_duration": "Longest time for which a surface is open.",
     "limits.temperature": "At the centre of a surface.",

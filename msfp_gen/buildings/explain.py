@@ -157,7 +157,7 @@ def _kinds(scene: BuildingScene) -> Iterator[Table]:
     """Surfaces, doubtful values and bodies of every kind of bearing."""
     for number, members in enumerate(grouped(scene.every_bearing), start=1):
         bearing, where = scene.bearings[members[0]].bearing, _numbers(members, len(scene.bearings))
-        doubts = doubt_tables(doubtful_values(bearing))
+        doubts = doubt_tables(doubtful_values(bearing, float(max(scene.axial_loads[index] for index in members))))
         for table in (surface_table(bearing), *doubts, body_table(bearing)):
             yield Table(f"kind {number}, {where}: {table.title}", table.columns, table.rows)
 

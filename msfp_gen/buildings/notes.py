@@ -66,7 +66,7 @@ def _gathered(notes: Sequence[Note]) -> list[Note]:
 def value_notes(mount: BuildingBearing, load: float) -> tuple[Note, ...]:
     """Notes about doubtful values of a bearing and its interface. load: at rest [N]."""
     stiffness, needed, _ = standing_below(mount, load)
-    doubts = (*doubtful_values(mount.bearing), *unsteady("interface.rotational_stiffness", stiffness, needed))
+    doubts = (*doubtful_values(mount.bearing, load), *unsteady("interface.rotational_stiffness", stiffness, needed))
     return tuple(Note(0.0, "value", *doubt) for doubt in doubts)
 
 

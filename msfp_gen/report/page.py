@@ -126,13 +126,17 @@ def provenance_table(result: AnyResult) -> Table:
 
 def outcome(result: AnyResult) -> str:
     """How a run ended, and its verdict, in one or two sentences."""
-    ends, verdict = {"ok": "The run reached its end", "stopped": "The run ended at its stop condition"}, result.verdict
-    if result.status not in ends:
-        lines = verdict.exceeded_text
+    verdict, lines = result.verdict, result.verdict.exceeded_text
+    if verdict.failure:
         return f"The run failed ({result.status}): {result.message}" + (
             f". Until then exceeded: {lines}" if lines else ""
         )
-    return ends[result.status] + (f", {verdict.text}." if verdict.ok else f". Limits of the device {verdict.text}.")
+    if verdict.stopped is not None:
+        limits = (
+            f"Limits of the device exceeded: {lines}" if lines else "Until then it was within the limits of the device"
+        )
+        return f"The run met its stop condition at {verdict.stopped:.4g} s. {limits}."
+    return "The run reached its end" + (f". Limits of the device {verdict.text}." if lines else f", {verdict.text}.")
 
 
 def _event_table(events: Sequence[Event]) -> Table:
@@ -280,7 +284,7 @@ def report_html(
         title_block=title.rows(device),
         scene=result.dataset.attrs["scene"],
         outcome=outcome(result),
-        good=result.verdict.ok,
+        verdict=result.verdict.word,
         speeds=SPEEDS,
         data=script_data(data),
         scripts=[Markup(asset(name)) for name in (*SCRIPTS, *kind.scripts)],

@@ -93,7 +93,9 @@ class AnyResult(ResultFiles, ABC):
     @cached_property
     def verdict(self) -> Verdict:
         """What the device was asked to bear, against its limits (docs/limits.md)."""
-        return verdict_of(self.bearings, self.scene.limits, "" if self.succeeded else self.status_text)
+        stopped = float(self.bearings[0].history.time[-1]) if self.status == "stopped" else None
+        failure = "" if self.succeeded else self.status_text
+        return verdict_of(self.bearings, self.scene.limits, failure, stopped)
 
     @property
     def status_text(self) -> str:

@@ -19,6 +19,7 @@ from msfp_gen.scene.friction_parameters import start_temperatures
 from msfp_gen.scene.scene_fields import Limits
 
 RIM_SHARE = 1 / 3  # rim force over the axial load, up to which the spring of a rim was compared
+COMPRESSION_SHARE = 0.1  # compression of a rim over the capacity of its surface
 SCALES = {"N": (1e-3, "kN"), "m": (1e3, "mm")}  # unit -> factor and unit of texts
 
 
@@ -86,16 +87,18 @@ class Reading:
 class Verdict:
     """Values against limits, of one bearing or of all of a building.
 
-    readings: of every limit that applies, bearing and surface. failure: how a run failed, else "".
+    readings: of every limit that applies, bearing and surface. failure: how a run failed, else "". stopped: time at
+    which it met its stop condition [s]; None: it did not.
     """
 
     readings: tuple[Reading, ...]
     failure: str = ""
+    stopped: float | None = None
 
     @property
     def ok(self) -> bool:
         """Whether the run reached its end and no limit was exceeded."""
-        return not self.failure and not self.exceeded
+        return self.word == "within"
 
     @cached_property
     def exceeded(self) -> tuple[Reading, ...]:
@@ -113,8 +116,9 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """One of within, exceeded, failed."""
-        return "failed" if self.failure else "exceeded" if self.exceeded else "within"
+        """One of within, stopped, exceeded, failed; what comes after the stop condition is not known."""
+        words = {"failed": self.failure, "exceeded": self.exceeded, "stopped": self.stopped is not None}
+        return next((word for word, holds in words.items() if holds), "within")
 
     @property
     def text(self) -> str:
@@ -122,7 +126,10 @@ class Verdict:
         lines = self.exceeded_text
         if self.failure:
             return "the run failed" + (f"; until then exceeded: {lines}" if lines else "")
-        return f"exceeded: {lines}" if lines else "within the limits of the device"
+        if self.stopped is None:
+            return f"exceeded: {lines}" if lines else "within the limits of the device"
+        stop = f"the run met its stop condition at {self.stopped:.4g} s"
+        return f"exceeded: {lines}; {stop}" if lines else f"{stop}; until then within the limits of the device"
 
     @property
     def exceeded_text(self) -> str:
@@ -152,7 +159,7 @@ class Verdict:
     @property
     def _summary(self) -> str:
         if not self.exceeded:
-            return "within all"
+            return "within all" + ("" if self.stopped is None else " until the stop condition")
         bearings = {reading.bearing for reading in self.exceeded} - {0}
         return f"exceeded{f' by {len(bearings)} bearing' + 's' * (len(bearings) > 1) if bearings else ''}"
 
@@ -168,8 +175,10 @@ class Verdict:
         }
 
 
-def verdict_of(bearings: Iterable[BearingData], limits: Limits | None, failure: str) -> Verdict:
-    """The verdict of a run. limits: of the scene; None: the defaults."""
+def verdict_of(
+    bearings: Iterable[BearingData], limits: Limits | None, failure: str, stopped: float | None = None
+) -> Verdict:
+    """The verdict of a run. limits: of the scene; None: the defaults. failure, stopped: as of `Verdict`."""
     allowed = limits or Limits()
     readings = [
         Reading(limit, one.number, one.label, value)
@@ -177,7 +186,7 @@ def verdict_of(bearings: Iterable[BearingData], limits: Limits | None, failure: 
         for limit in LIMITS
         for value in limit.read(one, allowed)
     ]
-    return Verdict(tuple(readings), failure)
+    return Verdict(tuple(readings), failure, stopped)
 
 
 def _by_surface(one: BearingData, rows: Array, reached: Array, allowed: Array | float) -> Iterator[Value]:
@@ -192,7 +201,7 @@ def _rim_force(one: BearingData, limits: Limits) -> Iterator[Value]:
     """The larger of the force in the rows and that of the rim spring at its largest compression over all steps."""
     bearing = one.bearing.arrays()
     rows, reached = one.history.rim_force, np.asarray(one.extremes.rim_force)
-    if not any(note.kind == "rims" and not note.action for note in one.notes):
+    if _rims_are_modelled(one):
         reached = np.maximum(reached, bearing["rim_stiffness"] * np.maximum(0.0, -one.extremes.gap))
     load = float(one.extremes.most_normal.max()) if one.axial_load is None else one.axial_load
     allowed = limits.rim_force or RIM_SHARE * load
@@ -200,9 +209,15 @@ def _rim_force(one: BearingData, limits: Limits) -> Iterator[Value]:
 
 
 def _rim_compression(one: BearingData, limits: Limits) -> Iterable[Value]:
-    if limits.rim_compression is None:
-        return ()
-    return _by_surface(one, -one.history.gap, np.maximum(0.0, -one.extremes.gap), limits.rim_compression)
+    if not _rims_are_modelled(one):
+        return ()  # `beyond_rim` says so
+    allowed = limits.rim_compression or COMPRESSION_SHARE * one.bearing.arrays()["capacity"]
+    return _by_surface(one, -one.history.gap, np.maximum(0.0, -one.extremes.gap), allowed)
+
+
+def _rims_are_modelled(one: BearingData) -> bool:
+    """Whether rims carry force wherever a slider went beyond its capacity."""
+    return not any(note.kind == "rims" and not note.action for note in one.notes)
 
 
 def _travel(one: BearingData, limits: Limits) -> Iterator[Value]:

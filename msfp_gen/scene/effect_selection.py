@@ -54,11 +54,13 @@ RADII = (0.05, 20.0)  # of sliding surfaces [m]
 LEAST_DAMPING = 0.01  # ratio of a vibration on vertical springs below which what it adds depends on the tolerance
 USUAL_DAMPING = 0.02  # ratio that is named as the remedy
 LARGEST_TILT = 0.5  # sliding capacity over radius; beyond it a slider tilts by more than 28 degrees
+RIM_LOAD = 1 / 3  # of the load at rest, which a rim must bear
+SOFTEST_RIM = 0.5  # compression of a rim by this load, over the capacity
 
 
 def scene_doubts(scene: SceneFields) -> Iterator[tuple[int, float, str]]:
     """Doubts about values of the bearing of a scene, and about the springs that hold its top plate up."""
-    yield from doubtful_values(scene.bearing)
+    yield from doubtful_values(scene.bearing, 0.0 if scene.effects.rims is False else load_at_rest(scene))
     if standing := standing_of(scene):
         yield from unsteady(*standing[:3])
     if (mass := sprung_mass(scene.top)) and isinstance(scene.top, MassTop):
@@ -83,8 +85,11 @@ def ringing(path: str, damping: float, what: str, turn: float, ratio: float, cur
     )
 
 
-def doubtful_values(bearing: Bearing) -> Iterator[tuple[int, float, str]]:
-    """Values that are unlikely: number of the surface, the value, and the text of the doubt with the likely slip."""
+def doubtful_values(bearing: Bearing, load: float = 0.0) -> Iterator[tuple[int, float, str]]:
+    """Values that are unlikely: number of the surface, the value, and the text of the doubt with the likely slip.
+
+    load: at rest, which rims must be able to stop [N]; 0: not known, or there are no rims.
+    """
     for number, surface in enumerate(bearing.surfaces, start=1):
         path = f"bearing.surfaces[{number - 1}]"
         if surface.friction > LARGEST_FRICTION:
@@ -105,6 +110,13 @@ def doubtful_values(bearing: Bearing) -> Iterator[tuple[int, float, str]]:
                 "usual are 0.1 to 1 mm"
             )
             yield number, surface.yield_displacement, text
+        if RIM_LOAD * load > SOFTEST_RIM * surface.capacity * surface.rim_stiffness > 0:
+            text = (
+                f"{path}.rim_stiffness = {surface.rim_stiffness:g} N/m stops no slider: compressed by half the "
+                f"capacity, {1e3 * SOFTEST_RIM * surface.capacity:.3g} mm, the rim bears less than a third of the load "
+                f"at rest, {load:.4g} N; is it in N/m, not in kN/mm?"
+            )
+            yield number, surface.rim_stiffness, text
 
 
 MIN_LOAD_SHARE = 0.2  # uplift is left out if more than this share of the load at rest remains throughout the run

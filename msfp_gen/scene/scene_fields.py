@@ -32,10 +32,11 @@ class Limits:
     """Limits of the device, of each bearing of a building. No number of a run depends on them, only its verdict.
 
     rim_force: of a rim [N]; None: a third of the axial load at rest, of the largest normal force where the load varies.
-    rim_compression: of a rim [m]; None: none. uplift_height: clearance between the faces of a surface [m]; None: the
-    height at which its rim acts, the rim_offset of its slider. uplift_duration: longest time for which a surface is
-    open [s]. temperature: at the centre of a surface [degC]. axial_load: largest vertical force on what is carried [N];
-    None: none. displacement: largest horizontal one across the bearing [m]; None: none. Raises InputError.
+    rim_compression: of a rim [m]; None: a tenth of the capacity of its surface. uplift_height: clearance between the
+    faces of a surface [m]; None: the height at which its rim acts, the rim_offset of its slider. uplift_duration:
+    longest time for which a surface is open [s]. temperature: at the centre of a surface [degC]. axial_load: largest
+    vertical force on what is carried [N]; None: none. displacement: largest horizontal one across the bearing [m];
+    None: none. Raises InputError.
     """
 
     rim_force: Annotated[float | None, _FORCE] = None

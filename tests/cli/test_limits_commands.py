@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from msfp_gen import load_scene
+from msfp_gen import changed_scene, load_scene
 from msfp_gen.cli import main
 from msfp_gen.scene.file.loader import scene_text
 from msfp_gen.studies import read_study
@@ -70,10 +70,25 @@ def test_a_report_is_green_only_within_the_limits(file: Path, tmp_path: Path, ca
     page = tmp_path / "page.html"
     assert main(["report", str(file), "-o", str(page), "--frames", "20"]) == 0
     text = page.read_text(encoding="utf-8")
-    assert 'class="status failed">The run reached its end. Limits of the device exceeded: rim force 15.12 kN' in text
+    assert 'class="status exceeded">The run reached its end. Limits of the device exceeded: rim force 15.12 kN' in text
     assert "EXCEEDED" in text and TEXT in capsys.readouterr().err
     assert main(["report", "fenz-test1", "-o", str(page), "--frames", "20"]) == 0
-    assert 'class="status">The run reached its end, within the limits of the device.' in page.read_text("utf-8")
+    assert 'class="status within">The run reached its end, within the limits of the device.' in page.read_text("utf-8")
+
+
+def test_a_run_that_met_its_stop_condition_is_green_nowhere(tmp_path: Path, capsys: Capture) -> None:
+    """Not in its tables, its report, a batch, a bounding analysis and a study."""
+    scene = changed_scene("fenz-test2", {"stop": {"displacement": 5e-3}})
+    (tmp_path / "scene.toml").write_text(scene_text(scene), encoding="utf-8")
+    file, page, study = str(tmp_path / "scene.toml"), tmp_path / "page.html", tmp_path / "study.toml"
+    assert main(["run", file]) == main(["report", file, "-o", str(page), "--frames", "20"]) == 0
+    assert "verdict the run met its stop condition at " in " ".join(capsys.readouterr().out.split())
+    assert 'class="status stopped">The run met its stop condition at ' in page.read_text("utf-8")
+    assert main(["batch", file, "--vary", "solver.rtol=1e-4,1e-5"]) == 0
+    assert [line.split()[-2] for line in capsys.readouterr().out.splitlines()[-2:]] == ["stopped", "stopped"]
+    study.write_text('scene = "scene.toml"\nkeep = ["verdict"]\n[axes.a]\nsets = "solver.rtol"\nvalues = [1e-4]\n')
+    assert main(["study", str(study), "-o", str(tmp_path / "out")]) == 0
+    assert read_study(tmp_path / "out")["verdict"].tolist() == ["stopped"]
 
 
 def test_a_study_keeps_the_limits_that_were_exceeded(file: Path, tmp_path: Path, capsys: Capture) -> None:

@@ -52,7 +52,6 @@ if TYPE_CHECKING:
     from msfp_gen.results.result import Result
     from msfp_gen.scene.bearing import Bearing
 
-STOPPED = "the run met the stop condition of the scene"
 CASES = ("lower", "nominal", "upper")
 # Word in the name of a model -> (field of `Auto`, value) that gives the effect to all cases.
 WIDER: dict[str, tuple[str, Any]] = {
@@ -92,16 +91,12 @@ class Case:
     @property
     def stopped_at(self) -> float | None:
         """Time at which the run met the stop condition of its scene [s]; None if it did not."""
-        result = self.result
-        return float(result.summary["duration"]) if result is not None and result.status == "stopped" else None
+        return None if self.result is None else self.result.verdict.stopped
 
     @property
     def verdict(self) -> str:
-        """The verdict of the run as text, with the time of the stop condition if the run met it."""
-        if self.result is None:
-            return "the run failed"
-        stop = "" if self.stopped_at is None else f"; {STOPPED} at {self.stopped_at:.4g} s"
-        return self.result.verdict.text + stop
+        """The verdict of the run as text."""
+        return "the run failed" if self.result is None else self.result.verdict.text
 
 
 @dataclass(frozen=True)
@@ -151,14 +146,20 @@ class Bounds:
         return {case.name: case.verdict for case in self.cases}
 
     def governing(self) -> dict[str, str]:
-        """Quantity -> the case that governs; without quantities where a case has no value, or all values are equal."""
+        """Quantity -> the case that governs; without quantities where a case has no value, or all values are equal.
+
+        Peaks of a case that met its stop condition, which others did not, are peaks until then: none of these governs.
+        """
         governing = {}
+        stopped = {case.name for case in self.cases if case.stopped_at is not None}
         for name, values in self.quantities().items():
             known = {case: value for case, value in values.items() if value is not None}
             governs = self.compared[name].quantity.governs
             if governs and len(known) == len(values) and len(set(known.values())) > 1:
                 extreme = max if governs == "most" else min
-                governing[name] = extreme(known, key=known.__getitem__)
+                worst = extreme(known, key=known.__getitem__)
+                if worst in stopped or len(stopped) in (0, len(self.cases)):
+                    governing[name] = worst
         return governing
 
     def as_dict(self) -> dict[str, Any]:

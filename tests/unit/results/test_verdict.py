@@ -32,10 +32,12 @@ from msfp_gen.buildings.explain import explain
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.cli import main
 from msfp_gen.common.identity import fingerprint
+from msfp_gen.report.page import outcome
 from msfp_gen.results.history import Event
 from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, merged, openings
 from msfp_gen.results.verdict import LIMITS, RIM_SHARE, Reading, Value
+from msfp_gen.scene.effect_selection import scene_doubts
 
 OPENING = 3e-3  # [m]
 GIVEN = [limit.key for limit in LIMITS if limit.key in {field.name for field in fields(Limits)}]
@@ -152,7 +154,8 @@ def test_the_defaults_are_those_of_the_page() -> None:
     assert worst["rim_force"].value.allowed == RIM_SHARE * LOAD and result.verdict.ok
     assert worst["travel"].value[2:] == (2.0, 3.0)
     assert lifted().verdict.worst["uplift_height"].value.allowed == BEARING.arrays()["rim_offset"][3]
-    assert not {"rim_compression", "axial_load", "displacement"} & worst.keys()
+    assert worst["rim_compression"].value.allowed == pytest.approx(0.1 * 0.065)
+    assert not {"axial_load", "displacement"} & worst.keys()
     assert Limits() == Limits(uplift_duration=0.1, temperature=250.0)
 
 
@@ -344,9 +347,51 @@ RARE = [  # long, or of layouts of their own
 def test_no_published_design_is_blamed(name: str | Path) -> None:
     """Every preset and example, as it is, is within the limits that are not given; the first have no notes."""
     result = simulate(load_scene(name))
-    assert result.scene.limits is None and result.verdict.ok, result.verdict.text
-    assert result.verdict.text == "within the limits of the device"
+    verdict, stopped = result.verdict, result.status == "stopped"
+    assert result.scene.limits is None and not verdict.exceeded and not verdict.failure, verdict.text
+    assert verdict.word == ("stopped" if stopped else "within") and verdict.ok != stopped
+    assert verdict.text.endswith("within the limits of the device")
     assert name not in FIRST or (result.status == "ok" and not result.notes)
+
+
+def test_a_rim_that_gives_way_is_no_rim() -> None:
+    """Stiffness in kN/mm in place of N/m: the force of the rim stays small, and the slider passes it."""
+    soft = changed_scene("fenz-test5", {"bearing.rim_stiffness": 10.0, "bearing.rim_damping": 0.0})
+    result = simulate(soft)
+    reading = result.verdict.worst["rim_compression"]
+    assert [one.limit.key for one in result.verdict.exceeded] == ["rim_compression"]
+    assert reading.value.reached == pytest.approx(-result.history.gap.min(), rel=1e-3) and reading.value.reached > 5e-3
+    assert reading.value.allowed == pytest.approx(0.1 * soft.bearing.surfaces[0].capacity)
+    texts = [note.text for note in result.notes if note.kind == "value"]
+    assert len(texts) == 4 and "rim_stiffness = 10 N/m stops no slider" in texts[0] and "kN/mm" in texts[0]
+    assert any("values that are hardly meant" in table.title for table in explain(soft))
+    without = replace(soft, effects=Auto(rims=False, sliders="inertial"))
+    assert not any("rim_stiffness" in text for _, _, text in scene_doubts(without))
+
+
+def test_soft_rims_of_a_building_are_noted() -> None:
+    made = scene(frame(), bearing=BEARING.replace(rim_stiffness=1e4), duration=0.1)
+    noted = [note for note in simulate(made).notes if note.kind == "value"]
+    assert {note.bearing for note in noted} == {1, 2, 3, 4}
+    assert all("rim_stiffness = 10000 N/m stops no slider" in note.text for note in noted)
+    assert sum("stops no slider" in str(table.rows) for table in explain(made)) == 1
+
+
+@pytest.mark.parametrize("limit", [None, Limits(displacement=2e-3)])
+def test_a_run_that_met_its_stop_condition_is_not_within(limit: Limits | None) -> None:
+    """What comes after is not known."""
+    result = simulate(changed_scene("fenz-test2", {"stop": {"displacement": 5e-3}}))
+    result = replace(result, scene=replace(result.scene, limits=limit))
+    verdict, (event,) = result.verdict, [event for event in result.events if event.kind == "stop"]
+    assert verdict.stopped == event.time < result.scene.end and not verdict.ok
+    assert verdict.word == result.summary["verdict"]["word"] == ("stopped" if limit is None else "exceeded")
+    assert f"the run met its stop condition at {event.time:.4g} s" in verdict.text
+    assert verdict.text.endswith("until then within the limits of the device") == (limit is None)
+    if limit is None:
+        assert verdict.table.title == "limits of the device: within all until the stop condition"
+        assert "Until then it was within the limits of the device." in outcome(result)
+    else:
+        assert outcome(result).endswith(f"Limits of the device exceeded: {verdict.exceeded_text}.")
 
 
 LIMITED = Limits(rim_force=12e3, uplift_height=1e-3, temperature=180.0, displacement=0.3)

@@ -146,9 +146,10 @@ function goTo(point) {
 function show({ found, settings, request: begun, cost }) {
   const problem = problemAt(state.index);
   const numbers = numbersOf(problem, found, settings.angle);
-  const ok = ["ok", "stopped"].includes(found.status);
-  find("status").textContent = ok ? "" : `the run ended at ${fixed(found.reached, 3)} s: ${found.status}`;
-  find("status").className = ok ? "status" : "status failed";
+  const words = { ok: "", stopped: "stopped" }, word = words[found.status] ?? "failed";
+  const end = { stopped: "the run met its stop condition", failed: `the run ended with ${found.status}` }[word];
+  find("status").textContent = word ? `${end} at ${fixed(found.reached, 3)} s` : "";
+  find("status").className = `status ${word}`;
   const kilo = numbers.force.map((v) => v / 1000);
   const milli = numbers.path.map((v) => v * 1000);
   const blue = problem.colours[0];
