@@ -17,8 +17,8 @@ from plain import plain_scene
 from quick import parser, pick
 
 from msfp_gen import Scene, simulate, simulate_batch
-from msfp_gen.buildings.file import changed_scene
 from msfp_gen.common.cores import usable_cores
+from msfp_gen.scene.file.source import changed_scene
 
 STUDIES = {
     "ridgecrest-clc": ("motion.scale", np.linspace(0.3, 1.1, pick(16, 2))),

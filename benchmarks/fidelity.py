@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from msfp_gen import load_scene
-from msfp_gen.buildings.file import reduced
 from msfp_gen.motions.motion import Motion
+from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.scene import Scene
 from msfp_gen.studies import estimate
 from msfp_gen.studies.batch import pool_from, run_to_end
@@ -92,7 +92,7 @@ def draws(seed: int, count: int, median: float | None) -> Iterator[Scene]:
 def row(scene: Scene, level: str) -> list[float]:
     """The quantities of a run, the seconds of a core that it took, and whether it reached its end."""
     begin = time.process_time()
-    result = run_to_end(reduced(scene, level))
+    result = run_to_end(at_fidelity(scene, level))
     summary = result.summary
     capacities = [surface.capacity for surface in scene.bearing.surfaces]
     use = 1 - min(gap / capacity for gap, capacity in zip(summary["minimum_gap"], capacities, strict=True))

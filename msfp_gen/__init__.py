@@ -12,8 +12,6 @@ from msfp_gen.common.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.building import Building as Building
-    from msfp_gen.buildings.file import changed_scene as changed_scene
-    from msfp_gen.buildings.file import load_scene as load_scene
     from msfp_gen.buildings.scene import BuildingBearing as BuildingBearing
     from msfp_gen.buildings.scene import BuildingScene as BuildingScene
     from msfp_gen.buildings.storey import BaseSlab as BaseSlab
@@ -34,6 +32,8 @@ if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Body as Body
     from msfp_gen.scene.bearing import Surface as Surface
     from msfp_gen.scene.file import presets as presets
+    from msfp_gen.scene.file.source import changed_scene as changed_scene
+    from msfp_gen.scene.file.source import load_scene as load_scene
     from msfp_gen.scene.scene import Scene as Scene
     from msfp_gen.scene.scene_fields import InitialState as InitialState
     from msfp_gen.scene.scene_fields import Limits as Limits
@@ -82,10 +82,10 @@ _MODULES = {
     "TwoPort": "embedding.two_port",
     "bound": "studies.bounding",
     "build_model": "model.model",
-    "changed_scene": "buildings.file",
+    "changed_scene": "scene.file.source",
     "characterise": "results.result",
     "fit": "studies.calibration",
-    "load_scene": "buildings.file",
+    "load_scene": "scene.file.source",
     "presets": "scene.file.presets",
     "simulate": "simulation.simulate",
     "simulate_batch": "studies.batch",

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
 from msfp_gen.common.identity import NO_NUMBERS
+from msfp_gen.common.tables import Table
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
@@ -289,6 +290,18 @@ class BuildingScene:
         pairs = zip(self.bearings, self.modelled, strict=True)
         models = [ModelSpec(mount.bearing.layout, replace(effects, top_rotation=True)) for mount, effects in pairs]
         return tuple(dict.fromkeys(models))
+
+    def explain(self) -> list[Table]:
+        """Tables that describe the scene, as of `scene.explain.explain`."""
+        from msfp_gen.buildings.explain import explain
+
+        return explain(self)
+
+    def at_fidelity(self, word: str) -> Any:
+        """The scene at a level of fidelity, as of `scene.fidelity.at_fidelity`."""
+        from msfp_gen.buildings.fidelity import at_fidelity
+
+        return at_fidelity(self, word)
 
     def _node(self, index: int) -> Node:
         """The node to which a bearing is attached. Raises InputError: unknown node, or a node that carries none."""

@@ -83,8 +83,8 @@ def bound(
     if suite is not None:
         _bound_suite(scene, factors, output, suite, as_json)
         return
-    from msfp_gen.buildings.file import load_scene
     from msfp_gen.common.output import make_folder
+    from msfp_gen.scene.file.source import load_scene
     from msfp_gen.studies.bounding import load_factors
     from msfp_gen.studies.bounding import runs as module
 
@@ -193,9 +193,9 @@ def fit(
 
     Runs have the solver.rtol of the scene, then smaller ones until their error is small against the intervals.
     """
-    from msfp_gen.buildings.file import load_bearing_scene
     from msfp_gen.common.output import check_output, make_folder
     from msfp_gen.report import REPORT_SUFFIXES, write_fit_report
+    from msfp_gen.scene.file.source import load_bearing_scene
     from msfp_gen.studies.calibration.fit_result import fit_tables
     from msfp_gen.studies.calibration.fitting import end_fit, start_fit
 

@@ -213,8 +213,8 @@ def _report(
     name: str, duration: float | None, folder: Path | None, as_json: bool, study: Callable[[Scene], Study]
 ) -> None:
     """Load the scene, run the study, print it and write its files."""
-    from msfp_gen.buildings.file import load_bearing_scene
     from msfp_gen.common.output import make_folder
+    from msfp_gen.scene.file.source import load_bearing_scene
     from msfp_gen.studies.accuracy.study import as_dict, tables, write
 
     scene = load_bearing_scene(name)

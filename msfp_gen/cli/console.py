@@ -24,11 +24,11 @@ from msfp_gen.results.sign import SIGNS
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.file import AnyScene
     from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.common.tables import Table
     from msfp_gen.results.result import Result
     from msfp_gen.results.verdict import Verdict
+    from msfp_gen.scene.system import System
 
     AnyResult = Result | BuildingResult
 
@@ -106,10 +106,9 @@ SignOption = Annotated[
 
 def scenes(incomplete: str) -> list[tuple[str, str]]:
     """Completions of a scene for the shell, with descriptions: presets, scene files and folders."""
-    from msfp_gen.scene.file.catalogue import descriptions
+    from msfp_gen.scene.file.catalogue import scene_descriptions
 
-    known = {**descriptions("scene"), **descriptions("building")}
-    presets = [(name, line) for name, line in known.items() if name.startswith(incomplete)]
+    presets = [(name, line) for name, line in scene_descriptions().items() if name.startswith(incomplete)]
     folder, _, start = incomplete.rpartition("/")
     files = sorted(Path(folder or ("/" if incomplete.startswith("/") else ".")).glob(f"{start}*"))
     paths = [path for path in files if path.is_dir() or path.suffix == ".toml"]
@@ -218,7 +217,7 @@ def building(kept: bool = True) -> Iterator[Callable[[str, float], None]]:
         note(f"built in {monotonic() - begin:.1f} s{'; later runs load it from the cache' if kept else ''}")
 
 
-def load_source(source: str) -> AnyResult | AnyScene:
+def load_source(source: str) -> AnyResult | System:
     """Load a saved result (.nc), or the scene of a file or preset, of one bearing or of a building."""
     if source.lower().endswith(".nc"):
         from msfp_gen.buildings.result import BuildingResult
@@ -227,9 +226,10 @@ def load_source(source: str) -> AnyResult | AnyScene:
 
         result: Any = read_result(source, Result, BuildingResult)
         return result  # type: ignore[no-any-return]
-    from msfp_gen.buildings.file import load_scene
+    from msfp_gen.scene.file.source import load_scene
 
-    return load_scene(source)
+    scene: System = load_scene(source)
+    return scene
 
 
 def is_result(loaded: object) -> bool:
@@ -261,7 +261,7 @@ def one_bearing(loaded: Any, what: str) -> Any:
     return loaded
 
 
-def build(scene: AnyScene, gradients: bool = False) -> None:
+def build(scene: System, gradients: bool = False) -> None:
     """Build the models of a scene, with progress, unless they are in the cache. gradients: ones that have them."""
     from msfp_gen.model.model import build_model
 
@@ -270,7 +270,7 @@ def build(scene: AnyScene, gradients: bool = False) -> None:
             build_model(spec.layout, spec.effects, gradients, progress=progress)
 
 
-def run_scene(scene: AnyScene, **options: Any) -> tuple[Any, RunError | None]:
+def run_scene(scene: Any, **options: Any) -> tuple[Any, RunError | None]:
     """Run a scene; its result (of a failed run as far as it was computed), and the error of a failed run."""
     from msfp_gen.scene.scene import Scene
     from msfp_gen.simulation.memory import require_room
@@ -286,14 +286,14 @@ def run_scene(scene: AnyScene, **options: Any) -> tuple[Any, RunError | None]:
             return error.result if is_result(error.result) else None, error
 
 
-def result_of(loaded: AnyResult | AnyScene) -> tuple[Any, RunError | None]:
+def result_of(loaded: AnyResult | System) -> tuple[Any, RunError | None]:
     """A loaded result, or the run of a loaded scene, and the error of a failed run.
 
     Raises RunError if nothing was computed.
     """
     if is_result(loaded):
         return loaded, None
-    result, failure = run_scene(loaded)  # type: ignore[arg-type]
+    result, failure = run_scene(loaded)
     if result is None:
         assert failure is not None
         raise failure

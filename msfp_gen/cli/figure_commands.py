@@ -27,9 +27,9 @@ from msfp_gen.results.sign import DEFAULT, sign_of
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from msfp_gen.buildings.file import AnyScene
     from msfp_gen.cli.console import AnyResult
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.scene.system import System
 
 ROWS = 4000  # rows of a run made for figures: the steps of the solver may be too long for smooth curves
 EVERY = "all"
@@ -178,7 +178,7 @@ def _reject_unused(targets: dict[str, Path], options: dict[str, float | None], u
             raise InputError(f"{option}: only {' and '.join(users)} have it; give --figure {users[0]} with it")
 
 
-def _load_for_figures(source: str) -> AnyResult | AnyScene:
+def _load_for_figures(source: str) -> AnyResult | System:
     """A saved result, or a scene with an output step for smooth figures; a building has the rows of its steps."""
     from msfp_gen.scene.scene import Scene
 
@@ -255,10 +255,10 @@ def explore(
     ] = Path("explorer.html"),
 ) -> None:
     """Write one HTML file in which sliders change a bearing and its motion, and the response is computed at once."""
-    from msfp_gen.buildings.file import load_bearing_scene
     from msfp_gen.common.output import check_output
     from msfp_gen.report import REPORT_SUFFIXES
     from msfp_gen.report.explore import write_explorer
+    from msfp_gen.scene.file.source import load_bearing_scene
 
     path = check_output(output, REPORT_SUFFIXES, "--output")
     first = None if scene is None else load_bearing_scene(scene)

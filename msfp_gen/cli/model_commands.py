@@ -71,8 +71,8 @@ def generate(
 @app.command(epilog="Example:\n\n\b\n  msfp-gen explain fenz-test2\n  msfp-gen explain scene.toml")
 def explain(scene: SceneName) -> None:
     """Describe a scene: bearing, motion, top, or building; what is modelled and how it is solved."""
-    from msfp_gen.buildings.explain import explain as describe
-    from msfp_gen.buildings.file import load_scene
+    from msfp_gen.scene.explain import explain as describe
+    from msfp_gen.scene.file.source import load_scene
 
     show(describe(load_scene(scene)))
 
@@ -81,9 +81,10 @@ def explain(scene: SceneName) -> None:
 def presets() -> None:
     """List the scenes, buildings and bearings that come with msfp-gen."""
     from msfp_gen.common.tables import Table
-    from msfp_gen.scene.file import presets as catalogue
+    from msfp_gen.scene.file.catalogue import descriptions, words
 
-    show(Table(f"preset {kind}s", (), list(catalogue.names(kind).items())) for kind in ("scene", "building", "bearing"))
+    bearing, *systems = words()
+    show(Table(f"preset {word}s", (), list(descriptions(word).items())) for word in (*systems, bearing))
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen doctor")
@@ -273,9 +274,9 @@ def fmu(
     ] = "cs",
 ) -> None:
     """Write a bearing as a unit (FMU) for Co-Simulation: a rig takes motion and gives wrenches, a mass takes forces."""
-    from msfp_gen.buildings.file import load_bearing_scene
     from msfp_gen.common.tables import Table
     from msfp_gen.embedding.unit import write_fmu
+    from msfp_gen.scene.file.source import load_bearing_scene
 
     if kind not in TYPES:
         raise InputError(f"--type = {kind!r}: give one of {', '.join(TYPES)}")
@@ -311,9 +312,9 @@ def serve(
     host: Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
 ) -> None:
     """Serve bearings to `element genericClient` of OpenSees: every element is a bearing of its own."""
-    from msfp_gen.buildings.file import load_bearing_scene
     from msfp_gen.embedding.server import Server
     from msfp_gen.embedding.two_port import TwoPort
+    from msfp_gen.scene.file.source import load_bearing_scene
 
     if up not in AXES:
         raise typer.BadParameter(f"--up = {up!r}: give one of {', '.join(AXES)}")

@@ -34,9 +34,9 @@ from msfp_gen.common.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_outp
 from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.file import AnyScene
     from msfp_gen.cli.console import AnyResult
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.scene.system import System
     from msfp_gen.studies.accuracy.error_target import Within
 
 CheckpointFile = Annotated[
@@ -231,7 +231,7 @@ def run(
         raise InputError("--stream: rows go to a netCDF file; give --output FILE.nc")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
-    from msfp_gen.buildings.file import load_scene
+    from msfp_gen.scene.file.source import load_scene
 
     chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
     note_written(_run(chosen, output, plot, as_json, checkpoints, target, strict, stream))
@@ -244,8 +244,8 @@ def demo(
     ),
 ) -> None:
     """Run an earthquake and a laboratory test; write figures and data."""
-    from msfp_gen.buildings.file import load_scene
     from msfp_gen.common.output import make_folder
+    from msfp_gen.scene.file.source import load_scene
 
     scenes = [load_scene(name) for name in DEMO]
     make_folder(output, "--output")
@@ -254,7 +254,7 @@ def demo(
         say("\n".join(["", *(f"wrote {path}" for path in written), ""]))
 
 
-def _with_options(scene: AnyScene, duration: float | None, **solver: Any) -> AnyScene:
+def _with_options(scene: System, duration: float | None, **solver: Any) -> System:
     """`scene` with the duration and solver options of the command line."""
     changes = {name: value for name, value in solver.items() if value is not None}
     scene = replace(scene, solver=replace(scene.solver, **changes)) if changes else scene
@@ -262,7 +262,7 @@ def _with_options(scene: AnyScene, duration: float | None, **solver: Any) -> Any
 
 
 def _run(
-    scene: AnyScene,
+    scene: System,
     output: Path | None,
     plot: Path | None,
     as_json: bool = False,

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.buildings.explain import explain
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
@@ -24,6 +23,7 @@ from msfp_gen.results.note import by_importance
 from msfp_gen.results.result import AnyResult, Result
 from msfp_gen.results.run_data import BearingData
 from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.explain import explain
 from msfp_gen.studies.calibration import Fit, FittedTest
 from msfp_gen.studies.calibration.fit_result import correlation_table, estimate_table, residual_table
 from msfp_gen.studies.calibration.intervals import lag_one

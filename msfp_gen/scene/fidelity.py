@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, singledispatch
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -21,11 +21,12 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.scene.bearing import Bearing, Body, Surface
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.scene_fields import FIDELITIES
 from msfp_gen.scene.top import MassTop, PrescribedTop
 from msfp_gen.specification.layout import Effects, Layout
 
 if TYPE_CHECKING:
-    from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
     from msfp_gen.scene.top import Top
 
@@ -203,13 +204,23 @@ UNSEEN = {
 }
 
 
-def at_fidelity(scene: Scene, word: str) -> Scene:
-    """The scene at a level of fidelity: "exact" (as it is), "loose", "massless" or "equivalent".
+def at_fidelity(system: Any, word: str) -> Any:
+    """A system at a level of fidelity: "exact" (as it is), or another of `FIDELITIES`.
 
-    Raises InputError of one line where the scene has no such model.
+    Raises InputError of one line where there is no such level, or the system has no such model.
     """
-    if word == "exact":
-        return scene
+    if not isinstance(word, str) or word not in FIDELITIES:
+        raise InputError(f"fidelity = {word!r}: give one of {', '.join(map(repr, FIDELITIES))}")
+    return system if word == "exact" else _reduced(system, word)
+
+
+@singledispatch
+def _reduced(system: Any, word: str) -> Any:
+    return system.at_fidelity(word)
+
+
+@_reduced.register(Scene)
+def _reduced_scene(scene: Scene, word: str) -> Scene:
     if word not in _REDUCTIONS:
         levels = ", ".join(map(repr, ("exact", *_REDUCTIONS)))
         raise InputError(f"fidelity = {word!r}: one bearing has no such model; give one of {levels}")

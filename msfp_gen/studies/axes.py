@@ -16,15 +16,17 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from msfp_gen.buildings.file import AnyScene, located_value, reduced, scene_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.elementary import exp
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Choice, Quantity, check_fields
+from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.file.catalogue import parsed, suggestion
 from msfp_gen.scene.file.changes import changed_table, keys_of, multiplied_table
 from msfp_gen.scene.file.motion_tables import RecordMotion
+from msfp_gen.scene.file.source import located_value, scene_of
 from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.system import System
 from msfp_gen.studies.bounding import bounded_scene
 from msfp_gen.studies.bounding.factors import FactorTable
 
@@ -412,7 +414,7 @@ class SceneFactory:
         self._fidelity = recipe.scene.get("fidelity", "exact")
         base = {key: value for key, value in recipe.scene.items() if key != "fidelity"}
         self.base = scene_of(base)
-        reduced(self.base, self._fidelity)  # raises its errors
+        at_fidelity(self.base, self._fidelity)  # raises its errors
         self._set_paths = sorted(  # (depth, index of the axis, path): a table is set before its fields
             (len(keys_of(path)), index, path)
             for index, axis in enumerate(recipe.axes)
@@ -427,7 +429,7 @@ class SceneFactory:
                 self._fixed["motion_table"] = self.base.motion_table
         self._table = {key: value for key, value in base.items() if key not in self._fixed}
 
-    def scene(self, values: Sequence[Any]) -> AnyScene:
+    def scene(self, values: Sequence[Any]) -> System:
         """The scene of a run. values: one for each axis, in the order of the axes. Raises InputError."""
         axes, table = self.recipe.axes, self._table
         for _, index, path in self._set_paths:
@@ -444,7 +446,8 @@ class SceneFactory:
         for axis, value in pairs:
             if axis.change == "factors":
                 scene = bounded_scene(scene, self.recipe.factors[axis.paths[0]], value)
-        return reduced(scene, level)
+        reduced: System = at_fidelity(scene, level)
+        return reduced
 
     def _scaled(self, name: str, factor: float) -> Table:
         """The `[motion]` table of a record times a factor."""

@@ -27,13 +27,13 @@ from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
-from msfp_gen.buildings.file import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.errors import InputError, MsfpError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.system import System
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.simulate import simulate, state_at_start
 from msfp_gen.studies.estimation.backbone_run import check_backbone, run_backbone
@@ -262,7 +262,7 @@ def require(module: str, extra: str, what: str) -> None:
 
 
 def simulate_batch(
-    scenes: Iterable[AnyScene],
+    scenes: Iterable[System],
     *,
     workers: int | None = None,
     processes: bool = False,
@@ -309,7 +309,7 @@ def simulate_batch(
 
 
 def completed_runs(
-    scenes: Sequence[AnyScene],
+    scenes: Sequence[System],
     workers: int | None = None,
     *,
     processes: bool = False,
@@ -350,7 +350,7 @@ def completed_runs(
     return results()
 
 
-def check_method(scene: AnyScene) -> None:
+def check_method(scene: System) -> None:
     """Raise InputError where the method, or the model "backbone", does not run a scene; a building needs no check."""
     if scene.fidelity == "backbone":
         check_backbone(scene)
@@ -358,7 +358,7 @@ def check_method(scene: AnyScene) -> None:
         check(scene, scene.modelled)
 
 
-def build_models(scenes: Iterable[AnyScene]) -> None:
+def build_models(scenes: Iterable[System]) -> None:
     """Build the compiled models with which scenes start, where the cache of this host lacks them."""
     for spec in dict.fromkeys(spec for scene in scenes if scene.fidelity != "backbone" for spec in scene.specs):
         build_model(spec.layout, spec.effects)
@@ -369,7 +369,7 @@ class _OutOfTime(KeyboardInterrupt):
 
 
 def run_to_end(
-    scene: AnyScene, *, progress: Proceed = raise_if_stopped, seconds: float | None = None, **options: Any
+    scene: Any, *, progress: Proceed = raise_if_stopped, seconds: float | None = None, **options: Any
 ) -> Any:
     """Run one scene of a batch or a study; a run that fails after its first row returns its result too.
 
@@ -410,7 +410,7 @@ def _located(label: str) -> Iterator[None]:
         raise RunError(f"{label}: {error}", status=error.status, result=error.result) from error
 
 
-def _run(label: str, scene: AnyScene, strict: bool, proceed: Proceed | None, threads: int) -> Any:
+def _run(label: str, scene: System, strict: bool, proceed: Proceed | None, threads: int) -> Any:
     """The result of one run of a batch, in a worker; its RunError if it has no rows."""
     try:
         with _located(label):

@@ -25,7 +25,7 @@ from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.specification import formula
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.file import AnyScene
+    from msfp_gen.scene.system import System
 
 
 class Quantity(NamedTuple):
@@ -158,7 +158,7 @@ class Counts(NamedTuple):
     bearings: int = 0
 
     @classmethod
-    def of(cls, scene: AnyScene) -> Counts:
+    def of(cls, scene: System) -> Counts:
         """The counts of a scene."""
         surfaces = max(len(bearing.surfaces) for bearing in scene.every_bearing)
         if not isinstance(scene, BuildingScene):

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from msfp_gen.buildings import dataset as building_dataset
-from msfp_gen.buildings.file import AnyScene, with_absolute_paths
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, prefixed
@@ -28,6 +27,8 @@ from msfp_gen.results import dataset
 from msfp_gen.scene.file.catalogue import check_whole_numbers, known_keys, parsed
 from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.scene.file.loader import Suite, load_suite, scene_table, suite_from_table, toml_file
+from msfp_gen.scene.file.source import with_absolute_paths
+from msfp_gen.scene.system import System
 from msfp_gen.studies.axes import (
     INTENSITY,
     Axis,
@@ -215,7 +216,7 @@ class Study:
             codes = list(np.unravel_index(self.cells[sample], self.grid)) if self.grid else []
         return Task(number, first, tuple(codes), self.samples[sample])
 
-    def scene(self, run: int) -> AnyScene:
+    def scene(self, run: int) -> System:
         """The scene of one run, by its number in the table, from 1. Raises InputError."""
         if not 1 <= run <= self.runs:
             raise InputError(f"run = {run}: give a number from 1 to {self.runs}")
@@ -280,7 +281,7 @@ def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:
             raise InputError(f"surfaces has {surface}: this bearing has surfaces 1 to {count}")
 
 
-def _tried_scenes(study: Study, factory: SceneFactory) -> Iterator[tuple[tuple[int, int] | None, AnyScene, Files]]:
+def _tried_scenes(study: Study, factory: SceneFactory) -> Iterator[tuple[tuple[int, int] | None, System, Files]]:
     """The scene of the first run, and for each tried value of an axis the scene with this value in the first run.
 
     Yields (index of the axis, index of the value), None for the first run; the scene; and the files that it opened.
@@ -301,7 +302,7 @@ def _tried_scenes(study: Study, factory: SceneFactory) -> Iterator[tuple[tuple[i
             yield (index, place), *_scene_and_files(factory, changed, f"axes.{axis.name}: value {value!r}")
 
 
-def _scene_and_files(factory: SceneFactory, values: Sequence[Any], where: str) -> tuple[AnyScene, Files]:
+def _scene_and_files(factory: SceneFactory, values: Sequence[Any], where: str) -> tuple[System, Files]:
     """The scene of values of the axes, and the files that were opened for it. Raises InputError that names `where`."""
     with prefixed(f"{where}: "):
         with recording() as files:

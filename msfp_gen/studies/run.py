@@ -45,7 +45,7 @@ from msfp_gen.studies.columns import Column, Keep
 from msfp_gen.studies.definition import Study, Task, load_study
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.file import AnyScene
+    from msfp_gen.scene.system import System
 
 Progress = Callable[[int, int], None]
 FORMAT = 1  # version of the format of a part
@@ -214,7 +214,7 @@ def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
     return _part(order, rows, failed, {"seconds": f"{seconds:.4g}"} if order.timed else {}), failed
 
 
-def _row(make: Callable[[], AnyScene], order: Order, at: dict[str, float]) -> tuple[str, str, dict[str, Any]]:
+def _row(make: Callable[[], System], order: Order, at: dict[str, float]) -> tuple[str, str, dict[str, Any]]:
     """Status, message and kept columns of one run. make: makes its scene. at: numbers of the axes, for formulas."""
     try:
         scene = make()

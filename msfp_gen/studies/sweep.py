@@ -13,12 +13,13 @@ from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from msfp_gen.buildings.file import AnyScene, with_absolute_paths
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.errors import InputError, RunError, prefixed
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.scene.file.changes import keys_of
 from msfp_gen.scene.file.loader import scene_table
+from msfp_gen.scene.file.source import with_absolute_paths
+from msfp_gen.scene.system import System
 from msfp_gen.studies.axes import Axis, Recipe, SceneFactory, located, motion_of
 from msfp_gen.studies.columns import Counts, catalogue, plain_cell, value_at
 
@@ -37,7 +38,7 @@ class Variation(NamedTuple):
 
     source: str
     varied: Mapping[str, Any]
-    scene: AnyScene
+    scene: System
 
 
 def varied_field(text: str) -> tuple[str, list[Any]]:

@@ -17,11 +17,11 @@ from support import malformed_scenes
 from support import record_writers as w
 from support.damaged_records import CSV, MUTATIONS, WAVES
 
-from msfp_gen.buildings.file import load_scene
 from msfp_gen.cli import main
 from msfp_gen.common.errors import InputError
 from msfp_gen.scene.file.loader import dumps, scene_text
 from msfp_gen.scene.file.motion_tables import RECORDS
+from msfp_gen.scene.file.source import load_scene
 
 HEAD = "bearing = 'fenz-tfp'\ntop = {kind = 'rig', axial_load = 1e5, stiffness = 1e8, rotational_stiffness = 1e8}\n"
 GOOD = HEAD + "motion = {kind = 'harmonic', amplitude = 0.01, frequency = 1.0, cycles = 0.5}\n"

@@ -154,15 +154,15 @@ def test_options_change_the_scene(simulated):
 
 
 def test_options_not_given_leave_the_scene(simulated):
-    from msfp_gen.buildings.file import load_scene
+    from msfp_gen.scene.file.source import load_scene
 
     assert main(["run", "fenz-test2", "--json"]) == 0
     assert simulated == [load_scene("fenz-test2")]
 
 
 def test_scene_files_are_read(simulated, tmp_path):
-    from msfp_gen.buildings.file import load_scene
     from msfp_gen.scene.file.loader import scene_text
+    from msfp_gen.scene.file.source import load_scene
 
     path = tmp_path / "scene.toml"
     path.write_text(scene_text(load_scene("fenz-test1")), encoding="utf-8")
@@ -270,8 +270,8 @@ def test_explain_names_every_number_and_choice(capsys):
 def test_explain_has_a_meaning_for_every_choice():
     from typing import get_args, get_type_hints
 
-    from msfp_gen.buildings.explain import METHODS, TOPS
     from msfp_gen.common.fields import Choice, ruled_fields
+    from msfp_gen.scene.explain import METHODS, TOPS
     from msfp_gen.scene.file.loader import _TOPS
     from msfp_gen.scene.solver import Solver
     from msfp_gen.specification.layout import Effects

@@ -106,8 +106,11 @@ def test_packages_import_downward():
 
 
 def test_no_modules_import_each_other_in_a_circle():
-    """Imports for types and in functions count."""
-    left = {name: ours(path, late=True) for name, path in MODULES.items()}
+    """Imports for types and in functions count between packages; in one package a class may call what knows it."""
+    left = {
+        name: {other for other in ours(path, late=True) if place(other) != place(name)} | ours(path, late=False)
+        for name, path in MODULES.items()
+    }
     while left:
         free = {name for name, needs in left.items() if not needs & set(left)}
         assert free, f"a circle of imports among {sorted(left)}"

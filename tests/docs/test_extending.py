@@ -71,7 +71,7 @@ def test_new_words_are_known_everywhere(extended: Path) -> None:
     out = run(
         extended,
         f"""{SCENE}
-from msfp_gen.buildings.explain import explain
+from msfp_gen.scene.explain import explain
 from msfp_gen.generator import generate
 from msfp_gen.cli import main
 import msfp_gen

@@ -13,9 +13,9 @@ from scipy.integrate import solve_ivp
 from support import scene_of
 
 from msfp_gen import Auto, Effects, Load, Motion, Scene, Top, presets, simulate
-from msfp_gen.buildings.explain import explain
 from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import damping_share, quasistatic
+from msfp_gen.scene.explain import explain
 from msfp_gen.specification.friction_laws import HYSTERESIS, Hysteresis
 
 PLANAR = Effects(dimension="planar", sliders="massless")

@@ -20,10 +20,10 @@ from support.random_states import sensible
 from support.resuming import assert_same, interrupted
 
 from msfp_gen import Auto, Effects, InputError, Motion, Scene, Solver, Top, build_model, load_scene, presets, simulate
-from msfp_gen.buildings.explain import explain
 from msfp_gen.model.model import Ode
 from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import quasistatic
+from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
 from msfp_gen.scene.standing import seat_stiffness
 from msfp_gen.simulation.start import RestartState, start_run

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import cache
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from typing import Any
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Rule
+from msfp_gen.scene.system import kinds
 
 Table = dict[str, Any]
-KINDS = ("bearing", "scene", "building")
 
 # Effects of a preset unless its table gives others: the complete model of PEER 2017/07.
 PRESET_EFFECTS = {"dimension": "spatial", "sliders": "inertial", "rims": True, "uplift": False}
@@ -25,21 +26,33 @@ def bearing_table(name: str) -> Table:
 
 
 def scene_table(name: str) -> Table:
-    """The scene preset `name`, complete, without its description; raises InputError for an unknown name."""
+    """The preset `name` of a scene of one bearing, complete, without its description; raises InputError without one."""
     table = _find("scene", name)
     return table | {"name": name, "effects": {**PRESET_EFFECTS, **table.get("effects", {})}}
 
 
-def building_table(name: str) -> Table:
-    """The building preset `name`, complete, without its description; raises InputError for an unknown name."""
-    return _find("building", name) | {"name": name}
+def preset_table(name: str) -> Table | None:
+    """The complete table of a scene preset, of one bearing or of another kind; None: there is none of that name."""
+    if name in _tables("scene"):
+        return scene_table(name)
+    return next((_find(word, name) | {"name": name} for word in kinds() if name in _tables(word)), None)
 
 
-def descriptions(kind: str) -> dict[str, str]:
-    """Name -> one line of description of each preset of a kind, a word of `KINDS`. Raises InputError for another."""
-    if kind not in KINDS:
-        raise InputError(f"kind = {kind!r}: give one of {', '.join(map(repr, KINDS))}")
-    return {name: table["description"] for name, table in _catalogue()[kind].items()}
+def words() -> tuple[str, ...]:
+    """The words for what presets are of: bearings, scenes of one bearing, and the other kinds of systems."""
+    return ("bearing", "scene", *kinds())
+
+
+def descriptions(word: str) -> dict[str, str]:
+    """Name -> one line of description of each preset, by one of `words`. Raises InputError for another word."""
+    if word not in words():
+        raise InputError(f"kind = {word!r}: give one of {', '.join(map(repr, words()))}")
+    return {name: table["description"] for name, table in _tables(word).items()}
+
+
+def scene_descriptions() -> dict[str, str]:
+    """Name -> one line of description of every scene preset of any kind."""
+    return {name: line for word in words()[1:] for name, line in descriptions(word).items()}
 
 
 def suggestion(word: str, known: Mapping[str, Any] | list[str]) -> str:
@@ -80,25 +93,27 @@ def parsed(rule: Rule, value: object, path: str) -> Any:
         raise InputError(f"{path} = {value!r}: {error}") from None
 
 
-def _find(kind: str, name: str) -> Table:
-    tables = _catalogue()[kind]
+def _find(word: str, name: str) -> Table:
+    tables = _tables(word)
     if name not in tables:
         hint = suggestion(str(name), tables) or f"; the presets are {', '.join(tables)}"
-        raise InputError(f"{kind} = {name!r}: no preset of that name{hint}")
+        raise InputError(f"{word} = {name!r}: no preset of that name{hint}")
     return {key: value for key, value in tables[name].items() if key != "description"}
 
 
-@lru_cache(maxsize=1)
-def _catalogue() -> dict[str, dict[str, Table]]:
-    catalogue: dict[str, dict[str, Table]] = {kind: {} for kind in KINDS}
-    folder = files(__package__) / "presets"
+@cache
+def _tables(word: str) -> dict[str, Table]:
+    """Name -> table of each preset, by one of `words`. `[common]` lies under every table of its file."""
+    if word not in ("bearing", "scene"):
+        folder = kinds()[word].presets
+        return {} if folder is None else dict(_read(folder, lambda _: True))
+    own = files(__package__) / "presets"
+    return dict(_read(own, lambda name: (name == "bearings.toml") == (word == "bearing")))
+
+
+def _read(folder: Traversable, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Table]]:
     for path in sorted(folder.iterdir(), key=lambda path: path.name):
-        if not path.name.endswith(".toml"):
-            continue
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-        common = tables.pop("common", {})
-        for name, table in tables.items():
-            whole = common | table
-            kind = "bearing" if path.name == "bearings.toml" else "building" if "building" in whole else "scene"
-            catalogue[kind][name] = whole
-    return catalogue
+        if path.name.endswith(".toml") and wanted(path.name):
+            tables = tomllib.loads(path.read_text(encoding="utf-8"))
+            common = tables.pop("common", {})
+            yield from ((name, common | table) for name, table in tables.items())

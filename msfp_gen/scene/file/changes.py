@@ -12,11 +12,12 @@ from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, ruled_fields
 from msfp_gen.scene.bearing import Body, Surface
 from msfp_gen.scene.file.loader import MAX_DEPTH, complete_bearing, complete_part
+from msfp_gen.scene.file.schema import SCENE
+from msfp_gen.scene.system import kinds
 
 Table = dict[str, Any]
 Key = str | int | None  # of a table, of a list, of all rows of a list
 _STEP = re.compile(r"([^\[\].]+)((?:\[(?:\d+|\*)\])*)")
-COMMON = ("interface", "soil", "effects")  # tables of [building] for all bearings that have none of their own
 NO_TABLES: Mapping[str, Any] = MappingProxyType({})
 ROWS = {"surfaces": Surface, "bodies": Body}
 _COLUMNS = {  # a field of surfaces or bodies -> their list, and whether one value is a list of numbers
@@ -102,7 +103,7 @@ def _places(walk: _Walk, path: str) -> Iterator[_Place]:
 def _inner_places(walk: _Walk, inner: Any, keys: list[Key], common: Mapping[str, Any] = NO_TABLES) -> Iterator[_Place]:
     """The places to which keys lead from `inner`, which is a copy, as all that they lead through becomes one.
 
-    common: the tables that bearings of a building have where they have none of their own.
+    common: the tables that rows of a kind of systems have where they have none of their own.
     """
     key, *rest = keys
     for step in [key] if isinstance(key, str) else _rows(inner, key):
@@ -114,8 +115,8 @@ def _inner_places(walk: _Walk, inner: Any, keys: list[Key], common: Mapping[str,
         inner[step] = _own_bearing(walk, inner[step], rest[0]) if step == "bearing" else copy(inner[step])
         if isinstance(rest[0], str) and not isinstance(inner[step], dict):
             raise InputError(f"{step} is {inner[step]!r} here, which has no fields to change")
-        if step == "building" and isinstance(inner[step], dict):
-            common = {name: inner[step].get(name) for name in COMMON}
+        if inner is walk.root and isinstance(step, str) and step not in SCENE.model_fields and step in kinds():
+            common = {name: inner[step].get(name) for name in kinds()[step].common if isinstance(inner[step], dict)}
         if step == "bearing" and len(rest) == 1 and rest[0] in _COLUMNS and "layout" in inner[step]:
             yield from _column(walk, inner[step], str(rest[0]))
         else:

@@ -52,16 +52,15 @@ _FIELDS_ALONE = {"solver": Solver, "initial_state": InitialState, "stop": Stop, 
 
 
 def scene_table(source: str | Path) -> tuple[Table, Path | None]:
-    """The table of a scene file or a building's, not validated, and the path of the file; of a preset None.
+    """The table of a scene file, not validated, and the path of the file; of a preset None.
 
     Raises InputError of one line that names the file, or the preset that does not exist.
     """
-    for kind, table in (("scene", catalogue.scene_table), ("building", catalogue.building_table)):
-        if str(source) in catalogue.descriptions(kind):
-            return table(str(source)), None
     path = Path(source)
+    if path.suffix != ".toml" and (table := catalogue.preset_table(str(source))) is not None:
+        return table, None
     if not is_input(path):
-        known = [*catalogue.descriptions("scene"), *catalogue.descriptions("building")]
+        known = catalogue.scene_descriptions()
         hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
         raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
     with prefixed(f"{path}: "):
@@ -111,7 +110,8 @@ def scene_from_table(
         parts["effects"] = replace(parts["effects"], top_rotation=True)
     word = parts.pop("fidelity", "exact")
     scene = Scene(**parts, motion_table=motion_keys if motion is None else motion_table)
-    return at_fidelity(scene, word)
+    reduced: Scene = at_fidelity(scene, word)
+    return reduced
 
 
 def scene_parts(

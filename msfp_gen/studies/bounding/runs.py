@@ -48,9 +48,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.buildings.file import AnyScene
     from msfp_gen.results.result import Result
     from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.scene.system import System
 
 CASES = ("lower", "nominal", "upper")
 # Word in the name of a model -> (field of `Auto`, value) that gives the effect to all cases.
@@ -77,7 +77,7 @@ class Case:
     """
 
     name: str
-    scene: AnyScene
+    scene: System
     result: Result | BuildingResult | None
     characterisation: Characterisation | None
     failure: str = ""
@@ -182,7 +182,7 @@ class Bounds:
         }
 
 
-def bound(scene: AnyScene, table: FactorTable, *, progress: Progress | None = None) -> Bounds:
+def bound(scene: System, table: FactorTable, *, progress: Progress | None = None) -> Bounds:
     """Run a scene with its properties at lower bound, nominal value and upper bound; of a building, of all bearings.
 
     A case that fails is part of the result, and the other cases are run. All cases have the same effects: where `Auto`
@@ -210,7 +210,7 @@ def _common_effects(scene: Scene, cases: Sequence[Case]) -> Auto | None:
     return replace(scene.effects, **{name: value for word, (name, value) in WIDER.items() if word in words})
 
 
-def _cases(scene: AnyScene, table: FactorTable, progress: Progress | None) -> list[Case]:
+def _cases(scene: System, table: FactorTable, progress: Progress | None) -> list[Case]:
     """Run the cases of a scene at the same time. Raises RunError where no case has rows."""
     scenes = bounded_scenes(scene, table)
     with closing(completed_runs(list(scenes.values()), labels=list(scenes), progress=progress)) as runs:
@@ -220,7 +220,7 @@ def _cases(scene: AnyScene, table: FactorTable, progress: Progress | None) -> li
     return [_case(name, scene, results[index]) for index, (name, scene) in enumerate(scenes.items())]
 
 
-def _case(name: str, scene: AnyScene, result: Any) -> Case:
+def _case(name: str, scene: System, result: Any) -> Case:
     if isinstance(result, RunError):
         return Case(name, scene, None, None, str(result).removeprefix(f"{name}: "))
     if result.status in ENDED:
@@ -228,7 +228,7 @@ def _case(name: str, scene: AnyScene, result: Any) -> Case:
     return Case(name, scene, result, None, result.message)
 
 
-def bounded_scenes(scene: AnyScene, table: FactorTable) -> dict[str, AnyScene]:
+def bounded_scenes(scene: System, table: FactorTable) -> dict[str, System]:
     """Case -> the scene with its properties multiplied; "nominal" is `scene` itself.
 
     A bearing of a building begins with the same effects in all cases: with uplift in all if it has uplift in any, the
@@ -251,13 +251,14 @@ def _with_uplift(scene: BuildingScene, uplift: Sequence[bool]) -> BuildingScene:
     return scene if bearings == list(scene.bearings) else replace(scene, bearings=bearings)
 
 
-def bounded_scene(scene: AnyScene, table: FactorTable, case: str) -> AnyScene:
+def bounded_scene(scene: System, table: FactorTable, case: str) -> System:
     """The scene of one case of CASES. Raises InputError as `bound`."""
     check_stack(scene)
     label = f"{scene.name or 'scene'}, {case}"
     if isinstance(scene, Scene):
         bearing = _bounded_bearing(scene.bearing, scene.law[1], table, case)
         return scene if case == "nominal" else replace(scene, bearing=bearing, name=label)
+    assert isinstance(scene, BuildingScene)
     bearings = []
     for index, mount in enumerate(scene.bearings):
         requested = mount.effects or Auto()
@@ -283,7 +284,7 @@ def _bounded_bearing(bearing: Bearing, law: Law | None, table: FactorTable, case
     return bearing
 
 
-def _typical(scene: AnyScene) -> Bearing:
+def _typical(scene: System) -> Bearing:
     """The bearing of a scene; of a building the bearing with the most surfaces."""
     return max(scene.every_bearing, key=lambda bearing: len(bearing.surfaces))
 

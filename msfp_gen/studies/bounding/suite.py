@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import RunError
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.figures.style import INK, distinct, headline, page, plain
-from msfp_gen.scene.scene import Scene
 from msfp_gen.studies.bounding.factors import FactorTable
 from msfp_gen.studies.bounding.runs import CASES, Progress, bound, shown_as
 from msfp_gen.studies.columns import Counts, Source, catalogue
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.buildings.file import AnyScene
+    from msfp_gen.scene.system import System
 
 # Quantities of the figure, where the runs have them.
 DRAWN = ("peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "capacity_left")
@@ -128,7 +128,7 @@ class SuiteBounds:
 
 
 def bound_suite(
-    scenes: Mapping[str, AnyScene], table: FactorTable, *, name: str = "", progress: Progress | None = None
+    scenes: Mapping[str, System], table: FactorTable, *, name: str = "", progress: Progress | None = None
 ) -> SuiteBounds:
     """Run the cases of `bound` under each motion of a suite, and keep the quantities of the runs.
 
@@ -176,10 +176,10 @@ def _progress_of(progress: Progress, row: int, count: int) -> Progress:
     return lambda done, whole: progress(row + done / whole, count)
 
 
-def _quantities(scene: AnyScene) -> dict[str, Source]:
+def _quantities(scene: System) -> dict[str, Source]:
     """Column -> quantity of which a value governs, with the name of its part of the bearing or building."""
     names: dict[str, list[str]] = {}
-    if not isinstance(scene, Scene):
+    if isinstance(scene, BuildingScene):
         names = {
             "floors": [node.name for node in scene.building.nodes],
             "storeys": [column.name for column in scene.building.columns],

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.buildings.file import check_one_ground, load_shares
+from msfp_gen.buildings.fidelity import check_one_ground, load_shares
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.jit.build import load_driver
@@ -26,9 +26,9 @@ from msfp_gen.scene.top import MassTop
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from msfp_gen.buildings.file import AnyScene
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.scene.system import System
     from msfp_gen.specification.layout import Auto, Effects
 
 STEP = 0.01  # largest step [s]
@@ -46,7 +46,7 @@ class BackboneRun:
     The sliding of each surface is taken from the published backbone at the peak displacement.
     """
 
-    scene: AnyScene
+    scene: System
     status: str
     message: str
     summary: dict[str, Any]
@@ -60,7 +60,7 @@ class BackboneRun:
         raise InputError("fidelity = 'backbone': it keeps no history; give 'equivalent'")
 
 
-def run_backbone(scene: AnyScene) -> BackboneRun:
+def run_backbone(scene: Any) -> BackboneRun:
     """Run a scene as a mass on its backbone. Raises InputError: the scenes that `check_backbone` refuses."""
     begin = time.perf_counter()
     check_backbone(scene)
@@ -97,7 +97,7 @@ def run_backbone(scene: AnyScene) -> BackboneRun:
     return BackboneRun(scene, summary["status"], "", summary)
 
 
-def check_backbone(scene: AnyScene) -> None:
+def check_backbone(scene: Any) -> None:
     """Raise InputError unless the scene is a mass on bearings that starts at rest on a base that does not rotate."""
     if isinstance(scene, Scene):
         if not isinstance(scene.top, MassTop):

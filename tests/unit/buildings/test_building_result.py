@@ -15,7 +15,6 @@ from support.synthetic import loops as loops_of_one
 from support.synthetic import opened
 
 from msfp_gen import Effects, InputError, RunError, Solver, characterise, simulate
-from msfp_gen.buildings.file import reduced
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import plot_loops, plot_orbit, plot_result, plot_sliding
 from msfp_gen.results.characterise import characterised, csv_rows
@@ -24,11 +23,12 @@ from msfp_gen.results.joining import at_times
 from msfp_gen.results.loops import ForcePath as Motions
 from msfp_gen.results.note import Note
 from msfp_gen.results.summary import summary_of_bearing
+from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.studies.columns import Counts, catalogue
 
 
 def test_the_note_of_a_cheaper_model_is_read_from_the_file(tmp_path: Path):
-    run = simulate(reduced(replace(pushed_scene(), duration=0.05), "rigid"))
+    run = simulate(at_fidelity(replace(pushed_scene(), duration=0.05), "rigid"))
     read = BuildingResult.from_netcdf(run.to_netcdf(tmp_path / "run.nc"))
     assert "fidelity" in {note.kind for note in run.notes}
     assert read.notes == run.notes and read.scene.fidelity == "rigid"
@@ -259,7 +259,7 @@ def test_cycles_of_a_motion_along_one_axis():
 
 
 def test_effects_of_each_bearing_are_selected_and_explained():
-    from msfp_gen.buildings.explain import explain
+    from msfp_gen.scene.explain import explain
 
     given = pushed_scene()
     assert given.modelled == 4 * (Effects(),)

@@ -103,8 +103,8 @@ def test_a_prebuilt_model_is_of_these_sources(installed: Path) -> None:
 
 def test_presets_are_among_the_prebuilt_models() -> None:
     from msfp_gen import load_scene
-    from msfp_gen.buildings.file import load_scene as load_building
     from msfp_gen.scene.effect_selection import select_effects
+    from msfp_gen.scene.file.source import load_scene as load_building
 
     names = {spec.key for spec in build.prebuilt_specs()}
     assert len(names) == 34

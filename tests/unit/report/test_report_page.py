@@ -14,7 +14,6 @@ import pytest
 from support import preset_run
 from support.synthetic import loops, opened
 
-from msfp_gen.buildings.explain import explain
 from msfp_gen.cli import main
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.motions.motion import Motion
@@ -24,6 +23,7 @@ from msfp_gen.report.page import BEARING, TERMS, provenance_table
 from msfp_gen.results.geometry import poses
 from msfp_gen.results.note import Note
 from msfp_gen.results.result import Result
+from msfp_gen.scene.explain import explain
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -28,7 +28,6 @@ from msfp_gen import (
     presets,
     simulate,
 )
-from msfp_gen.buildings.explain import explain
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.cli import main
 from msfp_gen.common.identity import fingerprint
@@ -38,6 +37,7 @@ from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, merged, openings
 from msfp_gen.results.verdict import LIMITS, RIM_SHARE, Reading, Value
 from msfp_gen.scene.effect_selection import scene_doubts
+from msfp_gen.scene.explain import explain
 
 OPENING = 3e-3  # [m]
 GIVEN = [limit.key for limit in LIMITS if limit.key in {field.name for field in fields(Limits)}]

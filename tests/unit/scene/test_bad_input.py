@@ -6,9 +6,9 @@ import pytest
 from support.malformed_scenes import GOOD, ROWS, broken
 
 from msfp_gen import presets
-from msfp_gen.buildings.file import load_scene
 from msfp_gen.common.errors import InputError
 from msfp_gen.scene.file.loader import dumps, scene_from_table
+from msfp_gen.scene.file.source import load_scene
 
 
 def line(error):

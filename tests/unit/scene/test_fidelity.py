@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from msfp_gen import InitialState, InputError, Limits, Motion, changed_scene, load_scene, simulate
-from msfp_gen.buildings.file import building_at_fidelity
 from msfp_gen.scene.fidelity import LOOSE, Backbone, at_fidelity, equivalent_pendulum, main_regime
 from msfp_gen.scene.file.loader import bearing_from_table, scene_table
 from msfp_gen.scene.parameters import parameters_of
@@ -108,11 +107,11 @@ def test_an_initial_state_has_no_equivalent():
 
 def test_a_rigid_building_keeps_mass_weight_and_loads():
     scene = load_scene("hospital-clc")
-    rigid = building_at_fidelity(scene, "rigid")
+    rigid = at_fidelity(scene, "rigid")
     assert rigid.building.mass.shape == (6, 6) and not rigid.building.stiffness.any()
     assert rigid.weight == pytest.approx(scene.weight, rel=1e-9)
     assert rigid.axial_loads.sum() == pytest.approx(scene.axial_loads.sum(), rel=1e-9)
-    one = building_at_fidelity(scene, "equivalent")
+    one = at_fidelity(scene, "equivalent")
     assert one.top.mass * scene.gravity == pytest.approx(scene.weight, rel=1e-9)
 
 
@@ -144,18 +143,18 @@ def test_models_of_one_ground_take_that_of_the_bearings(word):
     own = Motion.harmonic(0.15, 0.5, cycles=1)
     bearings = [replace(one, motion=own) for one in scene.bearings]
     moved = replace(scene, bearings=bearings, duration=own.duration)
-    expected = run_to_end(building_at_fidelity(replace(scene, motion=own), word)).summary
-    found = run_to_end(building_at_fidelity(moved, word)).summary
+    expected = run_to_end(at_fidelity(replace(scene, motion=own), word)).summary
+    found = run_to_end(at_fidelity(moved, word)).summary
     for name in ("peak_displacement", "peak_force"):
         assert found[name]["radial"] == expected[name]["radial"]
     mixed = replace(moved, bearings=[*bearings[:-1], scene.bearings[-1]])
     with pytest.raises(InputError, match=f"fidelity = '{word}': it has one motion of the ground"):
-        run_to_end(building_at_fidelity(mixed, word))
+        run_to_end(at_fidelity(mixed, word))
 
 
 def test_the_equivalent_of_a_building_keeps_its_limits():
     scene = replace(load_scene("hospital-clc"), limits=Limits(displacement=0.05))
-    assert building_at_fidelity(scene, "equivalent").limits == scene.limits
+    assert at_fidelity(scene, "equivalent").limits == scene.limits
 
 
 def test_values_of_the_stack_are_none_of_its_equivalent():

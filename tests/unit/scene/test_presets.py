@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from msfp_gen import presets
-from msfp_gen.buildings.file import load_scene
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Body, Surface
+from msfp_gen.scene.file.source import load_scene
 from msfp_gen.scene.scene_fields import Stop
 from msfp_gen.scene.top import Top
 from msfp_gen.specification.layout import Layout

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from msfp_gen import presets
-from msfp_gen.buildings.file import load_scene
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.records import bundled
 from msfp_gen.scene.file.loader import dumps, scene_from_table, scene_text
+from msfp_gen.scene.file.source import load_scene
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.scene.solver import Solver

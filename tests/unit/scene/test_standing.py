@@ -22,9 +22,9 @@ from msfp_gen import (
     presets,
     simulate,
 )
-from msfp_gen.buildings.explain import explain
 from msfp_gen.buildings.notes import building_doubts, value_notes
 from msfp_gen.scene.effect_selection import scene_doubts
+from msfp_gen.scene.explain import explain
 from msfp_gen.scene.standing import links, needed_rotational_stiffness, standing_of
 
 PLANAR = Effects(dimension="planar")

@@ -24,13 +24,13 @@ from msfp_gen import (
     presets,
     simulate,
 )
-from msfp_gen.buildings.explain import explain
 from msfp_gen.model.model import build_model
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.results.result import Result
 from msfp_gen.scene import effect_switching
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import Ending, all_effects, next_effects, stopping_monitors
+from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.scene.friction_parameters import thermal_softening
 from msfp_gen.scene.scene_fields import InitialState, Stop

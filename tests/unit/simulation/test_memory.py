@@ -35,7 +35,7 @@ def test_rows_that_cannot_fit_are_refused_before_anything_runs(
     with pytest.raises(InputError, match=words):
         simulate(scene)
     monkeypatch.setattr("msfp_gen.cli.console.build", None)  # not even built
-    monkeypatch.setattr("msfp_gen.buildings.file.load_scene", lambda _: scene)
+    monkeypatch.setattr("msfp_gen.scene.file.source.load_scene", lambda _: scene)
     assert main(["run", "fenz-test2", "-o", str(tmp_path / "run.nc")]) == 2
     assert "give at least 3.4e-05 [s], a shorter duration, or stream the rows to disk" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

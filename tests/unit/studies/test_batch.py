@@ -36,7 +36,6 @@ from msfp_gen import (
     simulate,
     simulate_batch,
 )
-from msfp_gen.buildings.file import changed_scene, reduced
 from msfp_gen.cli import main
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.model import model as models
@@ -44,6 +43,8 @@ from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.prescribed import Rotation
 from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import EffectSelection
+from msfp_gen.scene.fidelity import at_fidelity
+from msfp_gen.scene.file.source import changed_scene
 from msfp_gen.scene.scene import InitialState
 from msfp_gen.studies import batch
 from msfp_gen.studies.sweep import variations, varied_field
@@ -168,7 +169,7 @@ def test_every_number_is_that_of_simulate_in_processes() -> None:
 
 
 def test_strict_is_refused_where_runs_have_no_such_option() -> None:
-    for scene in (load_scene("hospital-clc"), reduced(plain_scene("ridgecrest-clc"), "backbone")):
+    for scene in (load_scene("hospital-clc"), at_fidelity(plain_scene("ridgecrest-clc"), "backbone")):
         with pytest.raises(InputError, match="strict: only runs of one bearing"):
             simulate_batch([usual()[0], scene], strict=True)
 

@@ -9,8 +9,7 @@ from scipy.optimize import minimize
 from scipy.stats import norm
 
 from msfp_gen import Effects, InputError, Motion, load_scene
-from msfp_gen.buildings.file import reduced
-from msfp_gen.scene.fidelity import Backbone
+from msfp_gen.scene.fidelity import Backbone, at_fidelity
 from msfp_gen.scene.file.loader import bearing_from_table
 from msfp_gen.studies import estimate, fragility, ida, read_study
 from msfp_gen.studies.batch import run_to_end
@@ -288,7 +287,7 @@ def test_the_backbone_meets_its_rims_as_the_bearing_does(rims):
         given, motion=motion, motion_table=None, duration=None, bearing=given.bearing.replace(reference_pressure=None),
         effects=effects, solver=replace(given.solver, rtol=1e-3),
     )  # fmt: skip
-    exact, cheap = run_to_end(scene).summary, run_to_end(reduced(scene, "backbone")).summary
+    exact, cheap = run_to_end(scene).summary, run_to_end(at_fidelity(scene, "backbone")).summary
     assert max(exact["minimum_gap"][0], cheap["minimum_gap"][0]) < 0
     assert (exact["peak_force"]["radial"] > 150e3) == rims
     for name in ("peak_displacement", "peak_force"):
@@ -298,7 +297,7 @@ def test_the_backbone_meets_its_rims_as_the_bearing_does(rims):
 def test_a_run_of_the_backbone_follows_the_exact_one():
     scene = load_scene("ridgecrest-clc")
     scene = replace(scene, duration=20.0, solver=replace(scene.solver, rtol=1e-3))
-    exact, cheap = run_to_end(scene), run_to_end(reduced(scene, "backbone"))
+    exact, cheap = run_to_end(scene), run_to_end(at_fidelity(scene, "backbone"))
     for name in ("peak_displacement", "peak_force"):
         assert cheap.summary[name]["radial"] == pytest.approx(exact.summary[name]["radial"], rel=0.3)
 

@@ -1,4 +1,4 @@
-"""Presets: bearings, scenes and buildings, by name. Their data are TOML files in this folder."""
+"""Presets by name: bearings and scenes, TOML files in this folder, and those of other kinds of systems."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def names(kind: str | None = None) -> dict[str, str]:
     """Name -> one line of description, of the presets of a `kind` ("bearing", "scene", "building"), or of all."""
-    kinds = catalogue.KINDS if kind is None else (kind,)
+    kinds = catalogue.words() if kind is None else (kind,)
     return {name: line for word in kinds for name, line in catalogue.descriptions(word).items()}
 
 

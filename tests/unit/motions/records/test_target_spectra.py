@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from msfp_gen import InputError, load_scene
-from msfp_gen.buildings.file import with_absolute_paths
 from msfp_gen.motions.records import baseline_corrected, bundled, response_spectrum
 from msfp_gen.motions.records.scaling import EN1998, ScaleTo, en1998_spectrum, read_spectrum, tabulated_spectrum
 from msfp_gen.motions.records.spectrum import measure_index
 from msfp_gen.scene.file.loader import load_suite, toml_file
+from msfp_gen.scene.file.source import with_absolute_paths
 
 TABLE = "# target of the site\nperiod [s], Sa [g]\n0.1, 0.5\n1, 0.4\n5, 0.05\n"
 G = 9.80665

@@ -1,0 +1,77 @@
+"""Cheaper models of the scene of a building (docs/fidelity.md)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from msfp_gen.buildings.building import Building
+from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.errors import InputError
+from msfp_gen.scene.fidelity import LEVEL, LOOSE, equivalent_pendulum, implicit_solver, labelled
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.top import Top
+from msfp_gen.specification.layout import Effects
+
+
+def at_fidelity(scene: BuildingScene, word: str) -> BuildingScene | Scene:
+    """The scene at a level of fidelity: "backbone", "loose", "massless", "rigid", or "equivalent".
+
+    "equivalent" gives the scene of one bearing that carries the whole building. Raises InputError of one line.
+    """
+    if word == "backbone":
+        return labelled(scene, word)
+    if word == "equivalent":
+        return _equivalent(scene)
+    if word == "loose" and scene.solver.rtol >= LOOSE:
+        raise InputError(f"fidelity = 'loose': solver.rtol = {scene.solver.rtol:g} already; give less than {LOOSE:g}")
+    bearings = scene.bearings if word == "loose" else [
+        replace(mount, effects=replace(effects, sliders="massless", uplift=False))
+        for mount, effects in zip(scene.bearings, scene.modelled, strict=True)
+    ]  # fmt: skip
+    building = rigid_building(scene.building) if word == "rigid" else scene.building
+    return replace(scene, building=building, bearings=bearings, solver=implicit_solver(scene.solver), fidelity=word)
+
+
+def rigid_building(building: Building) -> Building:
+    """The building as one rigid body with its nodes and without columns; its coordinates are the six rigid motions."""
+    motions = building.rigid_motions
+    zeros = np.zeros((6, 6))
+    nodes = tuple(replace(node, rows=node.rows @ motions) for node in building.nodes)
+    return Building(motions.T @ building.mass @ motions, zeros, zeros, nodes)
+
+
+def check_one_ground(scene: BuildingScene, word: str) -> None:
+    """Raise InputError where bearings have different motions of the ground. word: fidelity with one motion only."""
+    if len(set(scene.grounds[1])) > 1:
+        raise InputError(
+            f"fidelity = {word!r}: it has one motion of the ground, and bearings have motions of their own; give "
+            "another model, such as 'rigid'"
+        )
+
+
+def load_shares(scene: BuildingScene) -> list[float]:
+    """The share of the weight that each bearing carries at rest [-]."""
+    shares: list[float] = (scene.axial_loads / scene.axial_loads.sum()).tolist()
+    return shares
+
+
+def _equivalent(scene: BuildingScene) -> Scene:
+    """The scene of the equivalent pendulum of all bearings, which carries the building as a mass."""
+    check_one_ground(scene, "equivalent")
+    bearing = equivalent_pendulum(scene.every_bearing, load_shares(scene))
+    mass = float(scene.axial_loads.sum()) / scene.gravity
+    springs = [
+        float(sum(getattr(mount.interface, name) for mount in scene.bearings))
+        for name in ("vertical_stiffness", "vertical_damping")
+    ]
+    top = Top.mass(
+        mass, inertia=mass, height=0.0, rotational_stiffness=LEVEL * mass * scene.gravity,
+        vertical_stiffness=springs[0], vertical_damping=springs[1],
+    )  # fmt: skip
+    effects = Effects(dimension="spatial", sliders="massless", bouc_wen=scene.modelled[0].bouc_wen)
+    return Scene(
+        bearing=bearing, motion=scene.first_ground, top=top, effects=effects, solver=implicit_solver(scene.solver),
+        duration=scene.end, output_step=scene.output_step, name=scene.name, limits=scene.limits, fidelity="equivalent",
+    )  # fmt: skip
