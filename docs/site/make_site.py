@@ -166,7 +166,7 @@ print("rims met", summary["rims_met"])
 )
 BUILDING_SCRIPT = (
     HEAD
-    + """from msfp_gen.figures import plot_axial_forces, plot_building
+    + """from msfp_gen.buildings.figures import plot_axial_forces, plot_building
 
 result = simulate(load_scene("examples/{name}"))
 figure = plot_building(result)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -283,6 +284,24 @@ class BuildingResult(AnyResult):
     def part_tables(self) -> list[Table]:
         """Tables of the floors, storeys and bearings."""
         return summaries.tables(self.summary)
+
+    @property
+    def figures(self) -> Mapping[str, Any]:
+        """The figures of the run by their names, as of `figures.figures_of`."""
+        return self.scene.figures
+
+    def film(self, times: Array, azimuth: float | None) -> Any:
+        """The movie of the run, as of `figures.movie.film_of`."""
+        from msfp_gen.buildings.movie import building_film
+
+        return building_film(self, times, azimuth)
+
+    @property
+    def page(self) -> Any:
+        """What a report has of the run, as of `report.page.page_of`."""
+        from msfp_gen.buildings.page import PAGE
+
+        return PAGE
 
     def characterise(self) -> BuildingCharacterisation:
         """Effective properties of the isolation system, and the demand on every bearing (docs/buildings.md).

@@ -5,7 +5,7 @@ Loads at rest, vertical modes and the selected effects of each bearing follow fr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
@@ -296,6 +296,13 @@ class BuildingScene:
         from msfp_gen.buildings.explain import explain
 
         return explain(self)
+
+    @property
+    def figures(self) -> Mapping[str, Any]:
+        """The figures of a run by their names, as of `figures.figures_of`."""
+        from msfp_gen.buildings.figures import FIGURES
+
+        return FIGURES
 
     def at_fidelity(self, word: str) -> Any:
         """The scene at a level of fidelity, as of `scene.fidelity.at_fidelity`."""

@@ -247,13 +247,6 @@ def of_building(loaded: object) -> bool:
     return isinstance(loaded, BuildingScene | BuildingResult)
 
 
-def figures_of(loaded: object) -> Mapping[str, Callable[..., Any]]:
-    """The figures of a scene or result, of one bearing or of a building, by their names."""
-    from msfp_gen.figures import BUILDING_FIGURES, FIGURES
-
-    return BUILDING_FIGURES if of_building(loaded) else FIGURES
-
-
 def one_bearing(loaded: Any, what: str) -> Any:
     """A scene or result of one bearing. Raises InputError that begins with `what` for one of a building."""
     if of_building(loaded):

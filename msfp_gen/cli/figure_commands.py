@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +11,6 @@ import typer
 from msfp_gen.cli.console import (
     Progress,
     SignOption,
-    figures_of,
     load_source,
     note,
     note_exceeded,
@@ -28,10 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection
 
     from msfp_gen.cli.console import AnyResult
-    from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.system import System
 
-ROWS = 4000  # rows of a run made for figures: the steps of the solver may be too long for smooth curves
 EVERY = "all"
 
 app = typer.Typer()
@@ -77,6 +73,8 @@ def plot(
     """Draw a run: one figure, or all of them."""
     _check_figure_output(figure, output)
     sign_of(sign, "--sign")
+    from msfp_gen.figures import figures_of, plot_force_path, plot_section, using_sign
+
     loaded = _load_for_figures(source)
     targets = _targets(figure, output, figures_of(loaded))
     angle = None if azimuth is None else math.radians(azimuth)
@@ -84,7 +82,6 @@ def plot(
     _reject_unused(targets, {"--azimuth": azimuth, "--friction-circles": friction_circles or None}, ("section",))
     make_folder(next(iter(targets.values())).parent, "--output")
     result, failure = result_of(loaded)
-    from msfp_gen.figures import plot_force_path, plot_section, using_sign
     from msfp_gen.results.joining import at_times
 
     if time is not None:
@@ -149,13 +146,7 @@ def animate(
 
 
 def _check_figure_output(figure: str, output: Path) -> None:
-    """Raise InputError for a name that no figure has, or a path that cannot be written."""
-    from msfp_gen.figures import BUILDING_FIGURES, FIGURES
-
-    if figure not in (*FIGURES, *BUILDING_FIGURES, EVERY):
-        raise InputError(
-            f"--figure = {figure!r}: give one of {', '.join(dict.fromkeys((*FIGURES, *BUILDING_FIGURES, EVERY)))}"
-        )
+    """Raise InputError for a path that cannot be written."""
     if figure != EVERY and output.suffix:
         check_output(output, FIGURE_SUFFIXES, "--output")
     elif output.suffix.lower() in FIGURE_SUFFIXES:
@@ -179,18 +170,12 @@ def _reject_unused(targets: dict[str, Path], options: dict[str, float | None], u
 
 
 def _load_for_figures(source: str) -> AnyResult | System:
-    """A saved result, or a scene with an output step for smooth figures; a building has the rows of its steps."""
+    """A saved result, or a scene of one bearing with rows for smooth figures, or another system."""
+    from msfp_gen.figures import with_smooth_rows
     from msfp_gen.scene.scene import Scene
 
     loaded = load_source(source)
-    return _with_output_step(loaded) if isinstance(loaded, Scene) else loaded
-
-
-def _with_output_step(scene: Scene) -> Scene:
-    """The scene with ROWS rows, no further apart than the samples of a record, unless it has its own output step."""
-    if scene.output_step is not None:
-        return scene
-    return replace(scene, output_step=min(scene.end / ROWS, scene.motion.max_step or scene.end))
+    return with_smooth_rows(loaded) if isinstance(loaded, Scene) else loaded
 
 
 MOST = 5000  # instants in the interactive view; more would give a file of tens of megabytes

@@ -17,7 +17,6 @@ from msfp_gen.cli.console import (
     SceneName,
     build,
     choices_of,
-    figures_of,
     note,
     note_exceeded,
     note_written,
@@ -313,5 +312,7 @@ def _save(result: AnyResult, output: Path | None, plot: Path | None, written: bo
     if output is not None and not written:
         result.save(output)
     if plot is not None:
+        from msfp_gen.figures import figures_of
+
         figures_of(result)["overview"](result, plot)
     return [path for path in (output, plot) if path is not None]

@@ -7,11 +7,12 @@ matplotlib is imported when the first figure is drawn.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import singledispatch
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures.bearing import (
     plot_energy,
     plot_force_path,
@@ -21,39 +22,28 @@ from msfp_gen.figures.bearing import (
     plot_sliding,
     plot_stages,
 )
-from msfp_gen.figures.building import (
-    plot_axial_forces,
-    plot_building,
-    plot_floor_spectra,
-    plot_plan,
-    plot_profile,
-)
 from msfp_gen.figures.charts import plot_correction, plot_response_spectrum, plot_work_precision
 from msfp_gen.figures.movie import MOVIE_SUFFIXES, animate, check_movie
 from msfp_gen.figures.section import plot_section
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.sign import using_sign
+from msfp_gen.scene.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 __all__ = [
-    "BUILDING_FIGURES",
     "FIGURES",
     "MOVIE_SUFFIXES",
     "animate",
     "check_movie",
-    "plot_axial_forces",
-    "plot_building",
+    "figures_of",
     "plot_correction",
     "plot_energy",
-    "plot_floor_spectra",
     "plot_force_path",
     "plot_loops",
     "plot_orbit",
-    "plot_plan",
-    "plot_profile",
     "plot_response_spectrum",
     "plot_result",
     "plot_section",
@@ -61,6 +51,7 @@ __all__ = [
     "plot_stages",
     "plot_work_precision",
     "using_sign",
+    "with_smooth_rows",
 ]
 
 # Figures of one run, by their names on the command line.
@@ -74,12 +65,24 @@ FIGURES: dict[str, Callable[[RunData, str | Path | None], Figure]] = {
     "energy": plot_energy,
     "section": plot_section,
 }
+ROWS = 4000  # rows of a run made for figures: the steps of the solver may be too long for smooth curves
 
-# Figures of the run of a building, likewise.
-BUILDING_FIGURES: dict[str, Callable[[BuildingResult, str | Path | None], Figure]] = {
-    "overview": plot_building,
-    "plan": plot_plan,
-    "profile": plot_profile,
-    "spectra": plot_floor_spectra,
-    "axial": plot_axial_forces,
-}
+
+@singledispatch
+def figures_of(loaded: Any) -> Mapping[str, Callable[[Any, str | Path | None], Figure]]:
+    """The figures of a system or a result, by their names on the command line."""
+    figures: Mapping[str, Callable[[Any, str | Path | None], Figure]] = loaded.figures
+    return figures
+
+
+@figures_of.register(RunData)
+@figures_of.register(Scene)
+def _figures_of_bearing(_: RunData | Scene) -> Mapping[str, Callable[[Any, str | Path | None], Figure]]:
+    return FIGURES
+
+
+def with_smooth_rows(scene: Scene) -> Scene:
+    """The scene with ROWS rows, no further apart than the samples of a record, unless it has its own output step."""
+    if scene.output_step is not None:
+        return scene
+    return replace(scene, output_step=min(scene.end / ROWS, scene.motion.max_step or scene.end))

@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Callable
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -15,11 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.common.version import __version__
-from msfp_gen.figures.building import DEPTH, height_of, level_of, plan_of, size_of
 from msfp_gen.figures.style import colour
 from msfp_gen.results.geometry import POINTS, Poses, friction_circles, outline, poses
 from msfp_gen.results.history import History
@@ -35,8 +34,6 @@ if TYPE_CHECKING:
 FRAMES = 1500  # instants; 0.5 kB each for a triple pendulum, and more than a screen has pixel columns
 FEWEST = 600  # least number of instants, so that the motion looks continuous
 ARC = 20  # points on the profile of a spherical face
-SCALES = (1, 2, 5, 10, 20, 50, 100)  # of displacements in the view of a building
-SHOWN = 0.12  # displacement in it over the size of the building, about
 STATES = ("sticks", "slides", "rim contact", "separated")
 Rows = NDArray[np.intp]
 
@@ -162,79 +159,19 @@ def packed(values: Array) -> dict[str, Any]:
     return {"shape": list(values.shape), "data": data}
 
 
-def scale_of(result: BuildingResult) -> int:
-    """The magnification with which the view opens: displacements are seen and bearings stay apart."""
-    peak = max(bearing.summary["peak_displacement"]["radial"] for bearing in result.bearings)
-    wanted = SHOWN * size_of(result.scene) / peak if peak > 0 else 1.0
-    return max((scale for scale in SCALES if scale <= wanted), default=1)
-
-
-def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
-    """Data for the scripts, ready for JSON: lengths [m], forces [N], accelerations [m/s^2], axes E1, E2, E3."""
-    scene, rows = result.scene, building_rows(result, count)
-    nodes = [result.node(node.name)[rows] for node in scene.building.nodes]
-    motion = np.stack([node[:, 0] for node in nodes], axis=1)
-    motion[..., :3] -= result.ground[rows, None, 0]
-    low, high = plan_of(scene)
-    size = size_of(scene)
-    bearings = [bearing.history.displacement[rows] for bearing in result.bearings]
-    mean = np.mean(bearings, axis=0)
-    left = np.stack([bearing.history.gap[rows].min(axis=1) for bearing in result.bearings], axis=1)
-    heights = np.diff([node.position[2] for node in scene.building.nodes])
-    drift = np.hypot(*np.moveaxis(result.drift[rows, :, :2], -1, 0))
-    frames = {
-        "time": result.time[rows],
-        "node": motion,
-        "ground": result.ground[rows, 0],
-        "top": -np.stack(bearings, axis=1),
-        "ratio": result.axial_force[rows] / scene.axial_loads,
-        "left": left,
-        "mean": mean,
-        "shear": result.base_reaction[rows, :2],
-        "acceleration": np.stack([node[:, 2, :3] for node in nodes], axis=1),
-        "drift": drift / heights[: drift.shape[1]] if drift.shape[1] else drift,
-    }
-    return {
-        "peak": int(np.hypot(*mean[:, :2].T).argmax()),
-        "azimuth": 0.0,
-        "surfaces": [],
-        "nodes": [{"name": node.name, "position": node.position.tolist()} for node in scene.building.nodes],
-        "plates": bool(scene.building.columns),
-        "storeys": [column.name for column in scene.building.columns],
-        "places": [[*place, level_of(scene, index)] for index, place in enumerate(scene.places.tolist())],
-        "labels": [bearing.name or str(index + 1) for index, bearing in enumerate(scene.bearings)],
-        "loads": scene.axial_loads.tolist(),
-        "plan": [low.tolist(), high.tolist()],
-        "size": size,
-        "height": height_of(scene),
-        "depth": DEPTH * size,
-        "radius": 0.022 * size,
-        "scale": scale_of(result),
-        "frames": {name: packed(values) for name, values in frames.items()},
-    }
-
-
-def building_rows(result: BuildingResult, count: int) -> Array:
-    """Indices of rows of the view, shape (rows,) [-]: evenly in time, and the peaks of displacement and axial force."""
-    time = result.time
-    even = np.linspace(0, len(time) - 1, min(len(time), max(count, min(FEWEST, len(time)))))
-    peaks = [int(bearing.history.horizontal.argmax()) for bearing in result.bearings]
-    least = result.axial_force.argmin(axis=0).tolist()
-    return np.unique([*even.round().astype(int), *peaks, *least])
-
-
 RESOLUTION = 110  # dots per inch of the figures
 
 
 def render(template: str, **values: Any) -> str:
-    """The page of a template in assets/, as text. An undefined name is an error; text is escaped."""
+    """The page of a template, as text: of one in assets/ by its name, or of a text. An undefined name is an error."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
     from markupsafe import Markup
 
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True, loader=FunctionLoader(asset)
     )
-    return environment.get_template(template).render(version=__version__, style=Markup(asset("page.css")), **values)
+    page = environment.get_template(template) if template.endswith(".jinja") else environment.from_string(template)
+    return page.render(version=__version__, style=Markup(asset("page.css")), **values)
 
 
 def picture(title: str, figure: Figure) -> dict[str, str]:
@@ -244,9 +181,13 @@ def picture(title: str, figure: Figure) -> dict[str, str]:
     return {"title": title, "png": base64.b64encode(data.getvalue()).decode("ascii")}
 
 
-def asset(name: str) -> str:
-    """A file of assets/ as text."""
-    return files(__package__).joinpath("assets", name).read_text(encoding="utf-8")
+ASSETS = files(__package__) / "assets"
+
+
+def asset(name: str, folder: Traversable = ASSETS) -> str:
+    """A file of a folder, or where it has none of this name of assets/, as text."""
+    path = folder / name
+    return (path if path.is_file() else ASSETS / name).read_text(encoding="utf-8")
 
 
 def script_data(data: Any) -> Markup:

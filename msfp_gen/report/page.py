@@ -7,16 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import singledispatch
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
 from msfp_gen.common.version import __version__
-from msfp_gen.report.frames import FRAMES, SCALES, asset, building_view, picture, render, script_data, view, write_page
+from msfp_gen.report.frames import ASSETS, FRAMES, asset, picture, render, script_data, view, write_page
 from msfp_gen.results.files import COUNTER, PROVENANCE, without
 from msfp_gen.results.history import Event
 from msfp_gen.results.note import by_importance
@@ -51,18 +52,6 @@ TERMS = (
     ("friction mobilised", "share of the full friction force; 100 % while a surface slides, less while it sticks."),
     ("energy balance", "work of the ground and the loads, less all energy stored and dissipated; what remains is the "
      "error of the computation."),
-)  # fmt: skip
-BUILDING_TERMS = (
-    TERMS[0],
-    ("u", "horizontal displacement across a bearing: base less top, less its value at the start."),
-    ("N", "compression between a bearing and the building; at rest its share of the weight. Where it falls to zero, "
-     "the bearing would lift off."),
-    ("base shear", "horizontal force of the ground on all bearings."),
-    ("drift", "horizontal displacement of a floor relative to that below, tilt of the floors taken out."),
-    ("storey shear", "force that accelerates the floors above."),
-    ("floor spectrum", "largest response of oscillators of a period that stand on a floor, with 5 % damping."),
-    ("left", "capacity of a surface less its sliding: what remains until the slider meets the rim of its dish."),
-    ("rim", "the raised edge of a dish. Inner sliders of a triple pendulum meet theirs in strong motion."),
 )  # fmt: skip
 
 
@@ -162,12 +151,12 @@ SCRIPTS = ("three.min.js", "dom.js", "canvas.js", "data.js", "chart.js")  # of e
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 5, 10)
 
 
-class Kind(NamedTuple):
-    """What differs between the pages of a bearing and of a building.
+class Page(NamedTuple):
+    """What the page of a kind of systems has of its own.
 
-    name: of what moves, and of its template. introduction: the begin of one sentence about it. explanation: of its
-    view. figures: name -> title. scripts: after those of every page. view: data for the scripts, of about so many
-    instants.
+    name: of what moves. introduction: the begin of one sentence about it. explanation: of its view. figures: name ->
+    title. assets: folder of `stage` and `scripts`, which other scripts may lie beside in this package. stage: template
+    of the view. scripts: after those of every page. view: data for the scripts, of about so many instants.
     """
 
     name: str
@@ -175,6 +164,8 @@ class Kind(NamedTuple):
     explanation: str
     terms: tuple[tuple[str, str], ...]
     figures: Mapping[str, str]
+    assets: Traversable
+    stage: str
     scripts: tuple[str, ...]
     view: Callable[[Any, int], dict[str, Any]]
 
@@ -187,16 +178,7 @@ def _of_bearing(result: Result) -> str:
     )
 
 
-def _of_building(result: BuildingResult) -> str:
-    scene = result.scene
-    storeys = f"{len(scene.building.columns)} storeys" if scene.building.columns else "a structure"
-    return (
-        f"Simulation of {storeys} on {len(scene.bearings)} friction pendulum bearings, weight "
-        f"{1e-6 * scene.weight:.4g} MN"
-    )
-
-
-BEARING = Kind(
+BEARING = Page(
     "bearing",
     _of_bearing,
     "Bodies are drawn to scale with the radii, heights and capacities of the bearing; the height and thickness of rims "
@@ -212,28 +194,27 @@ BEARING = Kind(
         "energy": "Energy balance",
         "section": "Section at the largest displacement",
     },
+    ASSETS,
+    "bearing.html.jinja",
     ("section.js", "scene.js", "player.js", "page.js"),
     view,
 )
-BUILDING = Kind(
-    "building",
-    _of_building,
-    "The frame moves relative to the ground unless the box is cleared; displacements are drawn larger than the frame "
-    "by the chosen factor.",
-    BUILDING_TERMS,
-    {
-        "plan": "Plan with the orbits of all bearings",
-        "profile": "Peaks over the height",
-        "spectra": "Floor spectra",
-        "axial": "Axial force of every bearing",
-    },
-    ("frame.js", "player.js", "building.js"),
-    building_view,
-)
+
+
+@singledispatch
+def page_of(result: Any) -> Page:
+    """What the page of a run has of its own."""
+    page: Page = result.page
+    return page
+
+
+@page_of.register(Result)
+def _page_of_bearing(_: Result) -> Page:
+    return BEARING
 
 
 def write_report(
-    result: Result | BuildingResult,
+    result: Any,
     path: str | Path,
     frames: int = FRAMES,
     progress: Progress | None = None,
@@ -247,7 +228,7 @@ def write_report(
 
 
 def report_html(
-    result: Result | BuildingResult,
+    result: Any,
     frames: int = FRAMES,
     progress: Progress | None = None,
     title: TitleBlock = NO_TITLE,
@@ -262,19 +243,19 @@ def report_html(
     """
     from markupsafe import Markup
 
-    kind = BUILDING if isinstance(result, BuildingResult) else BEARING
-    data = kind.view(result, frames)
+    page = page_of(result)
+    data = page.view(result, frames)
     shown, rows = data["frames"]["time"]["shape"][0], len(result.bearings[0].history.time)
     device = ", ".join(dict.fromkeys(map(kind_of, result.scene.every_bearing)))
     return render(
         "page.html.jinja",
-        moving=f"The {kind.name} in motion",
-        stage=Markup(render(f"{kind.name}.html.jinja", scales=SCALES, chosen=data.get("scale"))),
-        lead=f"{kind.introduction(result)}, by msfp-gen {result.provenance.get('msfp_gen', __version__)}.",
-        terms=kind.terms,
-        explanation=f"{kind.explanation} Charts and views show {shown} instants of {rows} rows; the summary uses all "
+        moving=f"The {page.name} in motion",
+        stage=Markup(render(asset(page.stage, page.assets), **data.get("stage", {}))),
+        lead=f"{page.introduction(result)}, by msfp-gen {result.provenance.get('msfp_gen', __version__)}.",
+        terms=page.terms,
+        explanation=f"{page.explanation} Charts and views show {shown} instants of {rows} rows; the summary uses all "
         "rows. Click a chart to move to an instant.",
-        figures=list(_pictures(result, kind.figures, progress)),
+        figures=list(_pictures(result, page.figures, progress)),
         summary=[*summary_page(result), *note_tables(result)],
         characterisation=characterisation_page(result),
         settings=explain(result.scene),
@@ -287,15 +268,15 @@ def report_html(
         verdict=result.verdict.word,
         speeds=SPEEDS,
         data=script_data(data),
-        scripts=[Markup(asset(name)) for name in (*SCRIPTS, *kind.scripts)],
+        scripts=[Markup(asset(name, page.assets)) for name in (*SCRIPTS, *page.scripts)],
     )
 
 
 def _pictures(result: Any, titles: Mapping[str, str], progress: Progress | None) -> Iterator[dict[str, str]]:
     """Every figure of the report, for its template."""
-    from msfp_gen.figures import BUILDING_FIGURES, FIGURES
+    from msfp_gen.figures import figures_of
 
-    plots: Mapping[str, Any] = BUILDING_FIGURES if isinstance(result, BuildingResult) else FIGURES
+    plots = figures_of(result)
     for done, (name, title) in enumerate(titles.items(), start=1):
         drawn = picture(title, plots[name](result, None))
         if progress is not None:

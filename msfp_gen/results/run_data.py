@@ -158,6 +158,11 @@ class RunData(BearingData):
     gradients: Gradients | None = None
 
     @property
+    def time(self) -> Array:
+        """Times of the rows, ndarray, shape (T,), [s]."""
+        return self.history.time
+
+    @property
     def bearing(self) -> Bearing:
         """The bearing of the scene."""
         return self.scene.bearing

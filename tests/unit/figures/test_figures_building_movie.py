@@ -11,10 +11,10 @@ from support.buildings import MOTION, PLACES, frame, scene
 from support.films import drawn_twice
 
 from msfp_gen import Building, BuildingScene, InputError, simulate
+from msfp_gen.buildings.figures import MovingFrame
+from msfp_gen.buildings.movie import Elevation, building_film
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import animate, movie
-from msfp_gen.figures.building import MovingFrame
-from msfp_gen.figures.movie import Elevation, building_film
 from msfp_gen.results.joining import at_times
 
 TIMES = np.array([0.1, 0.355, 0.6])

@@ -9,7 +9,8 @@ import pytest
 from support.buildings import pushed_scene
 
 from msfp_gen import load_scene, simulate
-from msfp_gen.figures import plot_axial_forces, plot_building, plot_result
+from msfp_gen.buildings.figures import plot_axial_forces, plot_building
+from msfp_gen.figures import plot_result
 
 
 def test_the_title_of_a_bearing_states_the_peaks_of_the_summary():

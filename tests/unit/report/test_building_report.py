@@ -16,11 +16,10 @@ from support import thinned
 from support.buildings import BEARING, INTERFACE, frame, pushed, pushed_scene, scene
 
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, Motion, RunError, Storey, simulate
+from msfp_gen.buildings.figures import FIGURES as BUILDING_FIGURES
+from msfp_gen.buildings.page import PAGE, building_view, scale_of
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.figures import BUILDING_FIGURES
 from msfp_gen.report import TitleBlock, report_html
-from msfp_gen.report.frames import building_view, scale_of
-from msfp_gen.report.page import BUILDING as PAGE
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage")

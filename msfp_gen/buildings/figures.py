@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property, partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -348,3 +349,13 @@ class MovingFrame:
         """Whether each bearing carries less than `NOTHING` of its load at rest, shape (k, bearings)."""
         lifted: NDArray[np.bool_] = self.result.axial_force < NOTHING * self.scene.axial_loads
         return lifted
+
+
+# Figures of the run of a building, by their names on the command line.
+FIGURES: dict[str, Callable[[BuildingResult, str | Path | None], Figure]] = {
+    "overview": plot_building,
+    "plan": plot_plan,
+    "profile": plot_profile,
+    "spectra": plot_floor_spectra,
+    "axial": plot_axial_forces,
+}
