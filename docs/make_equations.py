@@ -77,7 +77,8 @@ differentiates it by parameters, program by program. Bodies are numbered 1 to n 
 $\gamma$ lies between bodies $\gamma$ and $\gamma+1$. Given are the coordinates `x`, the inertial `frame` with the
 translation of the base, `load_force` and `load_moment` on the top plate and, where a mass rests on a vertical spring,
 its `foot_stage`. The programs follow below, but for those that only gather, add or copy: `rim_coordinates`,
-`surface_moment`, `balances`, and with uplift `surface_force`, `split_moment`, `wrench_above`, `excess_force`."""
+`surface_moment`, `balances`, and with uplift `surface_force`, `split_moment`, `wrench_above`, `excess_force`,
+`contact_excess`."""
 
 CONDENSED = """### The condensed equations
 
@@ -91,7 +92,9 @@ what these leave of the sums are further rows, `excess`. Forces and moments are 
 BALANCES = r"""### The momentum balances
 
 The balances (3.26)-(3.29) at given unknowns (2.119), as PEER 2017/07 states them, with the state of `friction` and the
-`unknowns` of the contacts. With locked spin $\ddot\phi_k = 0$ takes the place of the axial balance of a body."""
+`unknowns` of the contacts. With locked spin $\ddot\phi_k = 0$ takes the place of the axial balance of a body. With
+uplift the unilateral contacts give the forces, as above, and further rows (`contact_excess`) state that the forces
+(3.15)-(3.17) of the `unknowns` are the same."""
 
 TWO_PORT = r"""### The ends of a two-port
 

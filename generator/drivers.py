@@ -132,7 +132,7 @@ def schedule_context(equations: Equations, directional: Iterable[Kernel], by_end
             _declared(LISTS[name], equations) for name in _lists(of_ends) if LISTS[name].kept is not Kept.PARAMETERS
         ],
         "variables": [
-            (kind, [_entries(name, quantities, equations) for name, quantities in parts])
+            (kind, [one for name, quantities in parts if (one := _entries(name, quantities, equations))["entries"]])
             for kind, parts in VARIABLES.items()
         ],
         "unknowns": unknowns(equations.spec),
@@ -238,7 +238,7 @@ def _entries(name: str, quantities: Iterable[str], equations: Equations) -> dict
     one = LISTS[name]
     block: Block = getattr(equations.blocks, one.kind)
     index = {field.name: i for i, field in enumerate(block.fields)}
-    parts = [part for quantity in quantities for part in block.quantities[quantity]]
+    parts = [part for quantity in quantities for part in block.quantities.get(quantity, ())]
     at = "[v->index]" if one.length else ""
     entries = [index[part] if isinstance(part, str) else -1 for part in parts]
     return {"values": f"{one.values_in_c}{at}", "tangents": f"{one.tangents_in_c}{at}", "entries": entries}

@@ -219,21 +219,32 @@ LISTS: Mapping[str, List] = {
 """All lists of blocks."""
 
 VARIABLES: Mapping[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
-    "coordinate": (("x", tuple(f"{name}{order}" for order in ("", 1, 2) for name in ("psi", "theta", "phi"))),),
+    "coordinate": (
+        ("x", tuple(f"{name}{order}" for order in ("", 1, 2) for name in ("psi", "theta", "phi"))),
+        ("x", ("d", "d1", "d2")),
+    ),
     "contact": (("unknowns", ("psi", "theta", "N")),),
     "friction": (("friction", ("Y", "Z")),),
     "base": (("frame", ("C", "V", "A")),),
     "load": (("load_force", ("F",)), ("load_moment", ("M",))),
 }
-"""The inputs with respect to which a schedule is differentiated, by their kind in `msfp.h`: list and quantities."""
+"""The inputs with respect to which a schedule is differentiated, by their kind in `msfp.h`: list and quantities.
+
+A block without uplift has no separation d.
+"""
 
 
 def unknowns(spec: ModelSpec) -> list[tuple[str, int, int]]:
-    """The unknowns (2.119) in order, as (kind, index, field) of `VARIABLES`: accelerations, contact positions, N."""
+    """The unknowns (2.119) in order, as (kind, index, field) of `VARIABLES`: accelerations, contact positions, N.
+
+    With uplift the accelerations of a body are followed by those of the separation below it.
+    """
     surfaces, planar = range(spec.layout.surfaces), spec.effects.dimension == "planar"
     angles, positions = ((1,), (1,)) if planar else ((0, 1, 2), (0, 1))
+    separations = () if not spec.effects.uplift else (0, 2) if planar else (0, 1, 2)
+    accelerations = (*(6 + i for i in angles), *(15 + i for i in separations))
     return [
-        *(("coordinate", j + 1, 6 + i) for j in surfaces for i in angles),
+        *(("coordinate", j + 1, field) for j in surfaces for field in accelerations),
         *(("contact", j, i) for j in surfaces for i in positions),
         *(("contact", j, 2) for j in surfaces),
     ]
@@ -293,10 +304,15 @@ STAGE = Call("contact_stage", ("surface_parameters[j]", "before[j]"), ("stage[j]
 
 
 def momentum_balances(effects: Effects) -> Schedule:
-    """The momentum balances (3.26)-(3.29) at given unknowns (2.119), as PEER 2017/07 states them."""
-    memory = effects.law is not None and effects.law.memory is not None
+    """The momentum balances (3.26)-(3.29) at given unknowns (2.119), as PEER 2017/07 states them.
+
+    With uplift the unilateral contacts give the forces of the surfaces. That the force (3.15)-(3.17) of a contact, at
+    given psi~, theta~ and N, is the same are further rows.
+    """
+    memory, uplift = effects.law is not None and effects.law.memory is not None, effects.uplift
     remembered = ("stage[j]",) if memory else ()
     rim = ("rim[j]",) if effects.rims else ()
+    above = "below[k]" if uplift else "moment[k]"
     surfaces = Pass(
         Over.SURFACES,
         (
@@ -308,7 +324,13 @@ def momentum_balances(effects: Effects) -> Schedule:
                 ("surface_parameters[j]", "unknowns[j]", "friction[j]", "relative[j]", *remembered),
                 ("report_contact[j]",),
             ),
-            Call("report_wrench", ("body[j]", "report_contact[j]", *rim), ("force[j]", "moment[j]")),
+            Call(
+                "report_wrench",
+                ("body[j]", "report_contact[j]", *rim),
+                ("carried[j]", "joint_moment[j]") if uplift else ("force[j]", "moment[j]"),
+            ),
+            *(_unilateral(effects.rims) if uplift else ()),
+            *((_split(effects.rims), CLOSURE) if uplift else ()),
         ),
     )
     bodies = Pass(
@@ -317,19 +339,32 @@ def momentum_balances(effects: Effects) -> Schedule:
             Call("linear_balance", ("body_parameters[k]", "body[k]", "force[k-1]", "force[k]"), ("linear[k]",)),
             Call(
                 "angular_balance",
-                ("body_parameters[k]", "body[k]", "force[k-1]", "moment[k-1]", "force[k]", "moment[k]"),
+                ("body_parameters[k]", "body[k]", "force[k-1]", "moment[k-1]", "force[k]", above),
                 ("angular[k]",),
             ),
             Call("balances", ("linear[k]", "angular[k]", "x[k]"), ("balances[k]",)),
         ),
     )
-    return {
-        "balances": (*(one for passes in _kinematics().values() for one in passes), _top(effects), surfaces, bodies)
-    }
+    top = (_top(effects), *((ABOVE,) if uplift else ()))
+    return {"balances": (*(one for passes in _kinematics().values() for one in passes), *top, surfaces, bodies)}
 
 
-def _uplift(rims: bool) -> tuple[Pass, ...]:
-    """Forces of the surfaces with uplift, of unilateral contacts and rims, and the residual of the linear balances."""
+ABOVE = Pass(Over.TOP, (Call("wrench_above", ("force[top]", "moment[top]"), ("carried[top]", "below[top]")),))
+"""With uplift: what acts above the top plate, which has no separation."""
+
+CLOSURE = Call("contact_excess", ("body[j]", "carried[j]", "force[j]"), ("excess[j]",))
+"""With uplift: that both statements of a contact force are one."""
+
+
+def _split(rims: bool) -> Call:
+    """With uplift: the moments of surface j on the bodies above and below."""
+    rim = ("rim_wrench[j]",) if rims else ()
+    reads = ("surface_parameters[j]", "joint_moment[j]", "unilateral[j]", *rim)
+    return Call("split_moment", reads, ("moment[j]", "below[j]"))
+
+
+def _unilateral(rims: bool) -> tuple[Call, ...]:
+    """Force of surface j with uplift, of its unilateral contact and its rim."""
     slider, wrench = "body[slider]", ("rim_wrench[j]",) if rims else ()
     contact = Decision(
         "msfp_unilateral_force(p, w, j)",
@@ -337,15 +372,17 @@ def _uplift(rims: bool) -> tuple[Pass, ...]:
     )
     on_rim = Call("rim_to_world", ("body[j]", "x[j+1]", "rim[j]"), ("rim_wrench[j]",))
     return (
-        Pass(
-            Over.SURFACES,
-            (
-                Call("unilateral_inside", ("surface_parameters[j]", slider, "x[j+1]"), ("unilateral[j]",), contact),
-                *((on_rim,) if rims else ()),
-                Call("surface_force", ("unilateral[j]", *wrench), ("force[j]",)),
-            ),
-        ),
-        Pass(Over.TOP, (Call("wrench_above", ("force[top]", "moment[top]"), ("carried[top]", "below[top]")),)),
+        Call("unilateral_inside", ("surface_parameters[j]", slider, "x[j+1]"), ("unilateral[j]",), contact),
+        *((on_rim,) if rims else ()),
+        Call("surface_force", ("unilateral[j]", *wrench), ("force[j]",)),
+    )
+
+
+def _uplift(rims: bool) -> tuple[Pass, ...]:
+    """Forces of the surfaces with uplift, and the residual of the linear balances."""
+    return (
+        Pass(Over.SURFACES, _unilateral(rims)),
+        ABOVE,
         Pass(
             Over.DOWNWARD,
             (
@@ -374,11 +411,10 @@ def condensed(effects: Effects) -> Schedule:
         f"for (int j = 0; j < MSFP_NB; ++j) msfp_contact_by_ends({values}, {moved})",
         fails=True,
     )
-    split = ("surface_parameters[j]", "joint_moment[j]", "unilateral[j]", *(("rim_wrench[j]",) if effects.rims else ()))
     moments = (
         Call("surface_moment", ("contact[j]", *rim), ("local_moment[j]",)),
         Call("moment_to_world", ("body[j]", "local_moment[j]"), ("joint_moment[j]" if uplift else "moment[j]",)),
-        *((Call("split_moment", split, ("moment[j]", "below[j]")),) if uplift else ()),
+        *((_split(effects.rims),) if uplift else ()),
     )
     above = "below[k]" if uplift else "moment[k]"
     balance = ("body_parameters[k]", "body[k]", "force[k-1]", "moment[k-1]", "force[k]", above)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import sympy as sp
 
 from .blocks import Blocks
+from .body import LEAST_FORCE
 from .functions import Select, Step
 from .program import Program, Symbols, Vector, add, combine, cross, dot, scale, subtract
 
@@ -168,7 +169,21 @@ def excess_force(b: Blocks) -> Program:
     return p
 
 
+def contact_excess(b: Blocks) -> Program:
+    """The force (3.15)-(3.17) at given psi~, theta~ and N with that of the rim, less that of the surface.
+
+    An open surface has the least force along its axis, as the condensed equations have it.
+    """
+    p = Program("contact_excess", "contact force (3.15)-(3.17) at given psi~, theta~, N less that of its spring")
+    body: Symbols = p.read(b.body, "b", active=("t3",))
+    given: Symbols = p.read(b.force, "s")
+    force: Symbols = p.read(b.force, "f")
+    p.write(b.linear, {"r": subtract(subtract(given["F"], force["F"]), scale(LEAST_FORCE, body["t3"]))})
+    return p
+
+
 def programs(b: Blocks, rims: bool) -> list[Program]:
     """The programs of a model with uplift."""
     contact = [unilateral_depth(b), unilateral_inside(b), unilateral_edge(b), *([rim_to_world(b)] if rims else [])]
-    return [*contact, surface_force(b, rims), split_moment(b, rims), wrench_above(b), excess_force(b)]
+    sums = [surface_force(b, rims), split_moment(b, rims), wrench_above(b), excess_force(b), contact_excess(b)]
+    return [*contact, *sums]

@@ -228,14 +228,14 @@ class Port(Protocol):
 Column = tuple[int, int, int]
 
 
-def columns(wrt: str, count: int, planar: bool) -> list[Column]:
+def columns(wrt: str, count: int, effects: Effects) -> list[Column]:
     """The columns of `Model.jacobian` for wrt = "unknowns", "state" or "inputs" of a stack with `count` surfaces.
 
     Raises InputError for another `wrt`.
     """
     makers: dict[str, Callable[[], list[Column]]] = {
-        "unknowns": lambda: unknown_columns(count, planar),
-        "state": lambda: state_columns(count),
+        "unknowns": lambda: unknown_columns(count, effects),
+        "state": lambda: state_columns(count, effects),
         "inputs": input_columns,
     }
     if wrt not in makers:
@@ -243,21 +243,33 @@ def columns(wrt: str, count: int, planar: bool) -> list[Column]:
     return makers[wrt]()
 
 
-def unknown_columns(count: int, planar: bool) -> list[Column]:
+def coordinate_fields(order: int, effects: Effects) -> list[int]:
+    """Fields of the coordinates of a body or of a derivative: angles, and with uplift separations."""
+    return [3 * order + i for i in range(3)] + [9 + 3 * order + i for i in range(3 if effects.uplift else 0)]
+
+
+def free_coordinates(effects: Effects) -> list[int]:
+    """The coordinates of a body that move: of a planar model the tilt in the plane, and the separation in it."""
+    every = [1, 3, 5] if effects.dimension == "planar" else [0, 1, 2, 3, 4, 5]
+    return [i for i in every if i < 3 or effects.uplift]
+
+
+def unknown_columns(count: int, effects: Effects) -> list[Column]:
     """The unknowns in the order of (2.119): accelerations, contact positions, normal forces."""
-    bodies, angles, contact = range(count), (1,) if planar else (0, 1, 2), (1,) if planar else (0, 1)
+    bodies, contact = range(count), (1,) if effects.dimension == "planar" else (0, 1)
+    fields = coordinate_fields(2, effects)
     return [
-        *((0, k + 1, 6 + i) for k in bodies for i in angles),
+        *((0, k + 1, fields[i]) for k in bodies for i in free_coordinates(effects)),
         *((1, k, i) for k in bodies for i in contact),
         *((1, k, 2) for k in bodies),
     ]
 
 
-def state_columns(count: int) -> list[Column]:
+def state_columns(count: int, effects: Effects) -> list[Column]:
     """The state q, v and h, each flattened."""
     bodies = range(count)
     return [
-        *((0, k + 1, 3 * order + i) for order in (0, 1) for k in bodies for i in range(3)),
+        *((0, k + 1, field) for order in (0, 1) for k in bodies for field in coordinate_fields(order, effects)),
         *((2, k, i) for k in bodies for i in range(2)),
     ]
 
@@ -343,8 +355,9 @@ FAILURES = {status.name: status.evaluation for status in STATUSES if status.eval
 class Evaluation:
     """One evaluation of the equations of motion.
 
-    acceleration: ndarray, shape (n-1, 3), second derivatives of psi, theta, phi [rad/s^2]; None in a massless model,
-    which does not determine accelerations. normal_force (n-1,) [N]; contact_angles (n-1, 2) psi~, theta~
+    acceleration: ndarray, shape (n-1, 3), second derivatives of psi, theta, phi [rad/s^2], with uplift (n-1, 6), those
+    of the separation [m/s^2] last; None in a massless model, which does not determine accelerations. unknowns: as
+    `Model.residual` takes them; None likewise. normal_force (n-1,) [N]; contact_angles (n-1, 2) psi~, theta~
     [rad]; friction_rate (n-1, 2) dY/dt, dZ/dt [1/s]; interface_force (n-1, 3) P on the body above [N]; slip_velocity
     (n-1, 2) u~, v~ [m/s]; friction_coefficient (n-1,), None where it is constant; sliding, gap (n-1,) [m].
     residual_norm: largest residual of a balance over its scale [-]; massless: largest moment over the largest normal
@@ -352,6 +365,7 @@ class Evaluation:
     """
 
     acceleration: Array | None
+    unknowns: Array | None
     normal_force: Array
     contact_angles: Array
     friction_rate: Array
@@ -363,16 +377,6 @@ class Evaluation:
     residual_norm: float
     newton_iterations: int
     determinant: int
-
-    @property
-    def unknowns(self) -> Array:
-        """The unknowns in the order of (2.119): accelerations, contact positions, normal forces; shape (6(n-1),) [SI].
-
-        Raises InputError for a massless model.
-        """
-        if self.acceleration is None:
-            raise InputError("unknowns: a massless model has no accelerations; build it with sliders = 'inertial'")
-        return np.concatenate([self.acceleration.ravel(), self.contact_angles.ravel(), self.normal_force])
 
 
 def named_vectors(n: int, points: Array, rotations: Array, bases: Array) -> dict[str, Array]:

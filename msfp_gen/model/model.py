@@ -18,13 +18,15 @@ from msfp_gen.model.compiled import (
     Stack,
     bodies_and_surfaces,
     columns,
+    free_coordinates,
     named_vectors,
+    separations_at_rest,
     state_columns,
     top_values,
     unknown_columns,
     vector,
 )
-from msfp_gen.model.plane import State, into_plane, out_of_plane
+from msfp_gen.model.plane import State, coordinates_out_of_plane, into_plane, out_of_plane
 from msfp_gen.motions.piecewise import derivatives
 from msfp_gen.scene.friction_parameters import check_bearing, law_parameters
 from msfp_gen.scene.top import is_sprung, load_values
@@ -39,9 +41,11 @@ if TYPE_CHECKING:
 class Ode:
     """y' = fun(t, y) with y = (q, v, h) flattened, shape (8(n-1),): angles [rad], rates [rad/s], Y and Z.
 
+    With uplift q and v are of shape (n-1, 6), angles and separations [m] with their rates [m/s], and y (14(n-1),).
     `jac(t, y)` is exact: it follows from the balances (3.26)-(3.29) by the implicit function theorem. `y0`: centred and
-    at rest. An instance unpacks as `fun, jac, y0`. Raises InputError for massless models, friction laws with
-    a memory of the surface, a top on a vertical spring, and a planar model with a motion outside the E1-E3 plane.
+    at rest, with uplift on contacts that carry the weights and the load of the top. An instance unpacks as `fun, jac,
+    y0`. Raises InputError for massless models, friction laws with a memory of the surface, a top on a vertical spring,
+    and a planar model with a motion outside the E1-E3 plane.
     """
 
     def __init__(self, model: Model, bearing: Bearing, motion: Motion, top: Top) -> None:
@@ -65,14 +69,19 @@ class Ode:
         self.count = model.layout.surfaces
         self.stack = model.stack(bearing, top, anchor=motion.displacement(0.0)[:2])
         self.load = load_values(top)
-        self.y0: Array = np.zeros(8 * self.count)
+        self.coordinates: int = model.extension.COORDINATES
+        q = np.zeros((self.count, self.coordinates))
+        if model.effects.uplift:
+            q[:, 3:] = separations_at_rest(bearing, top)
+        self.y0: Array = np.concatenate([q.ravel(), np.zeros(q.size + 2 * self.count)])
 
     def __iter__(self):  # type: ignore[no-untyped-def]
         return iter((self.fun, self.jac, self.y0))
 
     def _split(self, y: Array) -> tuple[Array, Array, Array]:
-        k = 3 * self.count
-        q, v, h = y[:k].reshape(-1, 3), y[k : 2 * k].reshape(-1, 3), y[2 * k :].reshape(-1, 2)
+        c = self.coordinates
+        k = c * self.count
+        q, v, h = y[:k].reshape(-1, c), y[k : 2 * k].reshape(-1, c), y[2 * k :].reshape(-1, 2)
         return np.ascontiguousarray(q, float), np.ascontiguousarray(v, float), np.ascontiguousarray(h, float)
 
     def _base(self, t: float) -> Array:
@@ -95,11 +104,14 @@ class Ode:
         return a, row, rates, iterations
 
     def fun(self, t: float, y: Array) -> Array:
-        """State derivative, ndarray, shape (8(n-1),), [rad/s, rad/s^2, 1/s]. Raises RunError: no acceleration."""
+        """State derivative, ndarray, shape of y, [rad/s, rad/s^2, 1/s] and of separations [m/s, m/s^2].
+
+        Raises RunError: no acceleration.
+        """
         return self.rates(t, y)[0]
 
     def rates(self, t: float, y: Array) -> tuple[Array, int]:
-        """The value of `fun`, shape (8(n-1),) [rad/s, rad/s^2, 1/s], and the number of Newton iterations."""
+        """The value of `fun`, ndarray, shape of y, and the number of Newton iterations."""
         a, _, rates, iterations = self._accelerations(t, y)
         return np.concatenate([self._split(np.asarray(y))[1].ravel(), a.ravel(), rates.ravel()]), iterations
 
@@ -111,26 +123,22 @@ class Ode:
         return self.model.unpack(self._accelerations(t, y)[1])
 
     def jac(self, t: float, y: Array) -> Array:
-        """Jacobian d fun/d y, ndarray, shape (8(n-1), 8(n-1)), [SI]. Raises RunError as `fun` does."""
+        """Jacobian d fun/d y, ndarray, shape (size of y, size of y), [SI]. Raises RunError as `fun` does."""
         q, v, h = self._split(np.asarray(y))
         base = self._base(t)
         a, row, *_ = self._accelerations(t, y)
         # The unknowns of `fun` are used here: solving the balances again could converge to another root.
-        jacobians, free = self.model.unpack(row), [1] if self.model.planar else [0, 1, 2]
-        angles = jacobians["angles"][:, 1:] if self.model.planar else jacobians["angles"]
-        unknowns = np.concatenate([a[:, free].ravel(), angles.ravel(), jacobians["normal"]])
-        inner, outer = unknown_columns(self.count, self.model.planar), state_columns(self.count)
+        effects = self.model.effects
+        unknowns, free = self.model.unknowns(a, row), free_coordinates(effects)
+        inner, outer = unknown_columns(self.count, effects), state_columns(self.count, effects)
         _, jacobian, rates = self.stack.report(q, v, h, base, self.load, unknowns, [*inner, *outer])
         split = len(inner)
         sensitivity = -np.linalg.solve(jacobian[:, :split], jacobian[:, split:])  # d unknowns / d y
-        k = 3 * self.count
-        out = np.zeros((8 * self.count, 8 * self.count))
+        k = self.coordinates * self.count
+        out = np.zeros((len(outer), len(outer)))
         out[:k, k : 2 * k] = np.eye(k)
-        accelerations = sensitivity[: split // (3 if self.model.planar else 2)]
-        if self.model.planar:
-            out[k + 1 : 2 * k : 3] = accelerations
-        else:
-            out[k : 2 * k] = accelerations
+        moving = (k + np.arange(k).reshape(self.count, -1)[:, free]).ravel()
+        out[moving] = sensitivity[: len(moving)]
         out[2 * k :] = rates[:, split:] + rates[:, :split] @ sensitivity
         return out
 
@@ -146,7 +154,9 @@ _models_lock = threading.Lock()
 class Model:
     """Compiled equations of one layout with one set of effects; made by `build_model`.
 
-    A planar model has the same array shapes as a spatial one. It accepts states in the E1-E3 or the E2-E3 plane.
+    A planar model has the same array shapes as a spatial one. It accepts states in the E1-E3 or the E2-E3 plane. With
+    uplift q, v and accelerations have shape (n-1, 6): after the angles of a body the separation delta of the surface
+    below it along E1, E2, E3 [m] (docs/uplift.md) and its derivatives.
     """
 
     def __init__(self, spec: ModelSpec, extension: ModuleType, info: BuildInfo) -> None:
@@ -197,12 +207,13 @@ class Model:
     ) -> Evaluation:
         """Accelerations, normal forces and friction rates at a state.
 
-        q, v: angles psi, theta, phi of bodies 2..n and rates, shape (n-1, 3) [rad], [rad/s]. h: Y, Z, shape (n-1, 2)
-        [-]. base_acceleration: shape (3,) [m/s^2]. top_force, top_moment: external load on the top plate at r_nn, shape
-        (3,) [N], [N m]. base_rotation: (angles, rates, accelerations) of psi_1, theta_1, phi_1, each of shape (3,)
-        [rad], [rad/s], [rad/s^2]. temperature: shape (n-1,) [degC], for a friction law with temperature; None: start
-        temperatures. formulation: "condensed" (contact in closed form), or "report" (Newton's method on all 6(n-1)
-        unknowns of (2.119)). Raises InputError for wrong shapes; RunError where no acceleration exists or is found.
+        q, v: angles psi, theta, phi of bodies 2..n and rates, shape (n-1, 3) [rad], [rad/s], with uplift (n-1, 6), see
+        `Model`. h: Y, Z, shape (n-1, 2) [-]. base_acceleration: shape (3,) [m/s^2]. top_force, top_moment: external
+        load on the top plate at r_nn, shape (3,) [N], [N m]. base_rotation: (angles, rates, accelerations) of psi_1,
+        theta_1, phi_1, each of shape (3,) [rad], [rad/s], [rad/s^2]. temperature: shape (n-1,) [degC], for a friction
+        law with temperature; None: start temperatures. formulation: "condensed" (contact in closed form), or "report"
+        (Newton's method on all unknowns of `residual`). Raises InputError for wrong shapes; RunError where no
+        acceleration exists or is found.
         """
         if formulation not in ("condensed", "report"):
             raise InputError(f"formulation = {formulation!r}: give 'condensed' or 'report'")
@@ -252,7 +263,8 @@ class Model:
         fields = self.unpack(row)
         turn = state.azimuth
         return Evaluation(
-            acceleration=None if a is None else out_of_plane(a, turn, "angles"),
+            acceleration=None if a is None else coordinates_out_of_plane(a, turn),
+            unknowns=None if a is None else self.unknowns(a, row),
             normal_force=fields["normal"],
             contact_angles=out_of_plane(fields["angles"], turn, "pair_angles"),
             friction_rate=out_of_plane(rates, turn, "pair"),
@@ -265,6 +277,12 @@ class Model:
             newton_iterations=int(iterations),
             determinant=int(sign),
         )
+
+    def unknowns(self, a: Array, row: Array) -> Array:
+        """The unknowns of `residual`, ndarray, from accelerations and a row, of a planar model in its plane [SI]."""
+        fields = self.unpack(row)
+        angles = fields["angles"][:, 1:] if self.planar else fields["angles"]
+        return np.concatenate([a[:, free_coordinates(self.effects)].ravel(), angles.ravel(), fields["normal"]])
 
     def unpack(self, rows: Array) -> dict[str, Array]:
         """Recorded rows, shape (..., row size) [SI], as arrays by name; `ROW` of the extension has names and shapes."""
@@ -289,7 +307,10 @@ class Model:
         psi~, theta~ surface by surface [rad], N [N]. Returns ndarray, shape (6(n-1),): for each body the linear balance
         along E1, E2, E3 [N], then the angular one along t_1, t_2, t_3 of the body [N m]; with locked spin, phi'' takes
         the place of the axial component. A planar model has 3(n-1) unknowns (theta'', theta~, N) and balances (E1, E3,
-        t_2). Other inputs and errors as in `evaluate`.
+        t_2). With uplift there are 9(n-1), in the plane 5(n-1): the accelerations of a body go on with those of the
+        separation [m/s^2], and after the balances come, surface by surface, the components of the force (3.15)-(3.17)
+        less that of the unilateral contact [N]. `Evaluation.unknowns` has this order. Other inputs and errors as in
+        `evaluate`.
         """
         state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
         values = vector(unknowns, "unknowns", (self.extension.UNKNOWNS,), "rad/s^2, rad, N")
@@ -310,13 +331,14 @@ class Model:
         top_moment: ArrayLike = ZERO,
         base_rotation: Rotation | None = None,
     ) -> Array:
-        """Jacobian of `residual`, ndarray, shape (6(n-1), k).
+        """Jacobian of `residual`, ndarray, shape (unknowns, k).
 
-        wrt: "unknowns" (k = 6(n-1), their order); "state" (k = 8(n-1): q, v, h, each flattened); "inputs" (k = 24: base
+        wrt: "unknowns" (their order); "state" (k = 8(n-1), with uplift 14(n-1): q, v, h, each flattened, of a planar
+        model in its plane); "inputs" (k = 24: base
         displacement, velocity, acceleration; psi_1, theta_1, phi_1, rates, accelerations; top force; top moment).
         Other inputs and errors as in `residual`.
         """
-        variables = columns(wrt, self.layout.surfaces, self.planar)
+        variables = columns(wrt, self.layout.surfaces, self.effects)
         state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
         values = vector(unknowns, "unknowns", (self.extension.UNKNOWNS,), "rad/s^2, rad, N")
         stack = self.stack(bearing)
@@ -328,8 +350,9 @@ class Model:
     ) -> dict[str, Array]:
         """Every named vector of (3.1)-(3.12) with velocity and acceleration.
 
-        q, v, a: angles of bodies 2..n, rates and accelerations, shape (n-1, 3) [rad], [rad/s], [rad/s^2]. base: shape
-        (3, 6): u_g1, u_g2, u_g3 [m], psi_1, theta_1, phi_1 [rad], and their first and second derivatives; None: zero.
+        q, v, a: angles of bodies 2..n, rates and accelerations, shape (n-1, 3) [rad], [rad/s], [rad/s^2], with uplift
+        (n-1, 6), separations last [m], [m/s], [m/s^2]. base: shape (3, 6): u_g1, u_g2, u_g3 [m], psi_1, theta_1, phi_1
+        [rad], and their first and second derivatives; None: zero.
         Returns {"r_01", "r_1", "r_11", "r_1c", "r_12", ...} [m], rates of names with v for r [m/s] and
         with a [m/s^2], "omega_k" and "omega'_k" [rad/s], "alpha_k" and "alpha'_k" [rad/s^2], "t_k" (3, 3): rows t_1,
         t_2, t_3. In stacks of ten and more bodies pairs have a stroke, "r_1_2", since "r_12" is the centre of body 12.
@@ -337,8 +360,8 @@ class Model:
         """
         if self.planar:
             raise InputError("kinematics: not available for a planar model; build it with dimension = 'spatial'")
-        shape = (self.layout.surfaces, 3)
-        q, v, a = (vector(x, name, shape, "rad") for x, name in ((q, "q"), (v, "v"), (a, "a")))
+        units = self._units("rad", "m"), self._units("rad/s", "m/s"), self._units("rad/s^2", "m/s^2")
+        q, v, a = (vector(x, name, self._shape, unit) for x, name, unit in zip((q, v, a), "qva", units, strict=True))
         motion = vector(np.zeros((3, 6)) if base is None else base, "base", (3, 6), "m, rad")
         points, rotations, bases = self.stack(bearing).vectors(q, v, a, motion)
         return named_vectors(self.layout.n, points, rotations, bases)
@@ -346,6 +369,15 @@ class Model:
     def as_ode(self, bearing: Bearing, motion: Motion, top: Top) -> Ode:
         """The model as y' = fun(t, y) with its Jacobian, for library integrators such as SciPy's; see `Ode`."""
         return Ode(self, bearing, motion, top)
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        """Shape of coordinates and of their derivatives."""
+        return self.layout.surfaces, 6 if self.effects.uplift else 3
+
+    def _units(self, angle: str, separation: str) -> str:
+        """Units of coordinates for messages."""
+        return f"{angle}; separation along E1, E2, E3: {separation}" if self.effects.uplift else angle
 
     def _state(
         self,
@@ -364,8 +396,8 @@ class Model:
             base[:, 3:] = vector(np.asarray(rotation, dtype=float), "base_rotation", (3, 3), "rad, rad/s, rad/s^2")
         load = np.concatenate([vector(force, "top_force", (3,), "N"), vector(moment, "top_moment", (3,), "N m")])
         state = State(
-            vector(q, "q", (count, 3), "rad"),
-            vector(v, "v", (count, 3), "rad/s"),
+            vector(q, "q", self._shape, self._units("rad", "m")),
+            vector(v, "v", self._shape, self._units("rad/s", "m/s")),
             vector(h, "h", (count, 2), "-"),
             base,
             load,

@@ -22,8 +22,9 @@ Kind = Literal["angles", "pair_angles", "pair", "vector", "axial"]
 class State:
     """State, base motion and load as arguments of a compiled stack.
 
-    Shapes: q, v (n-1, 3) [rad], [rad/s]; f (n-1, 2); base (3, 6), displacements, velocities and accelerations with
-    rotations, SI; load (6,) [N], [N m]. azimuth: of the E1 axis of their frame in the frame of the user [rad].
+    Shapes: q, v (n-1, 3) [rad], [rad/s], with uplift (n-1, 6), separations [m], [m/s] last; f (n-1, 2); base (3, 6),
+    displacements, velocities and accelerations with rotations, SI; load (6,) [N], [N m]. azimuth: of the E1 axis of
+    their frame in the frame of the user [rad].
     """
 
     q: Array
@@ -93,9 +94,9 @@ def tilt_pieces(angles: Array, azimuth: float) -> Array:
 
 def into_plane(state: State) -> State:
     """A state in the frame of its vertical plane, E1-E3 or E2-E3. Raises InputError if it lies in neither."""
-    base = state.base.copy()
+    base, across = state.base.copy(), [0, *range(4, state.q.shape[1], 3)]
     in_second = any(
-        np.any(x) for x in (state.q[:, 0], state.v[:, 0], state.f[:, 1], base[:, [1, 3]], state.load[[1, 3]])
+        np.any(x) for x in (state.q[:, across], state.v[:, across], state.f[:, 1], base[:, [1, 3]], state.load[[1, 3]])
     )
     azimuth = np.pi / 2 if in_second else 0.0
     base[:, :3] = rotated(base[:, :3], azimuth) if in_second else base[:, :3]
@@ -107,19 +108,35 @@ def into_plane(state: State) -> State:
         ("base_acceleration", base[:, 1]),
         ("top_force", force[1:2]),
         ("top_moment", moment[[0, 2]]),
+        ("q, separation", rotated(state.q[:, 3:], azimuth)[:, 1] if state.q.shape[1] > 3 else 0.0),
+        ("v, separation", rotated(state.v[:, 3:], azimuth)[:, 1] if state.v.shape[1] > 3 else 0.0),
     ):
         if np.any(np.abs(value) > 1e-12 * (1 + np.abs(np.concatenate([force, moment])).max())):
             raise InputError(f"{name} leaves the vertical plane of the state: give one plane, or dimension = 'spatial'")
     base[:, 1] = 0.0
     return replace(
         state,
-        q=tilts_into_plane(state.q, azimuth, "q"),
-        v=tilts_into_plane(state.v, azimuth, "v"),
+        q=_coordinates_into_plane(state.q, azimuth, "q"),
+        v=_coordinates_into_plane(state.v, azimuth, "v"),
         f=np.ascontiguousarray(f * [1.0, 0.0]),
         base=base,
         load=np.concatenate([force, moment]),
         azimuth=azimuth,
     )
+
+
+def _coordinates_into_plane(q: Array, azimuth: float, name: str) -> Array:
+    """Angles, and with uplift separations, (n-1, 3) or (n-1, 6), in the frame of their plane."""
+    angles = tilts_into_plane(q[:, :3], azimuth, name)
+    if q.shape[1] == 3:
+        return angles
+    return np.hstack([angles, rotated(q[:, 3:], azimuth) * [1.0, 0.0, 1.0]])
+
+
+def coordinates_out_of_plane(q: Array, azimuth: float) -> Array:
+    """Angles, and with uplift separations, shape (..., 3) or (..., 6) [unit of `q`], in the frame of the user."""
+    angles = out_of_plane(q[..., :3], azimuth, "angles")
+    return np.concatenate([angles, out_of_plane(q[..., 3:], azimuth, "vector")], axis=-1) if q.shape[-1] > 3 else angles
 
 
 def rotated_pairs(pairs: Array, angle: float) -> Array:

@@ -177,15 +177,17 @@ void msfp_foot_at_rest(const msfp_parameters *p, const msfp_point *at, double fo
 /* Accelerations at a given state from the condensed equations, into at->a. Returns MSFP_OK or a status. */
 int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, msfp_solution *out);
 
-/* The momentum balances of PEER 2017/07, 6(n-1) in space and 3(n-1) in the plane. Unknowns in the order of (2.119):
- * accelerations body by body, position angles of the normals surface by surface, normal forces. */
+/* The momentum balances of PEER 2017/07, 6(n-1) in space and 3(n-1) in the plane; with uplift also the forces of the
+ * unilateral contacts, 3(n-1) and 2(n-1). Unknowns in the order of (2.119): accelerations body by body, position angles
+ * of the normals surface by surface, normal forces. */
 #define MSFP_SPACE (MSFP_PLANAR ? 2 : 3)    /* components of a translation */
-#define MSFP_ANGLES_A (MSFP_PLANAR ? 1 : 3) /* accelerations of a body */
+#define MSFP_ANGLES_A (MSFP_PLANAR ? 1 : 3) /* accelerations of the angles of a body */
 #define MSFP_ANGLES_C (MSFP_PLANAR ? 1 : 2) /* position angles of a normal */
-#define MSFP_UNKNOWNS (MSFP_NB * (MSFP_PLANAR ? 3 : 6))
+#define MSFP_ACCELERATIONS (MSFP_ANGLES_A + (MSFP_UPLIFT ? MSFP_SPACE : 0)) /* of a body */
+#define MSFP_UNKNOWNS (MSFP_NB * (MSFP_ACCELERATIONS + MSFP_ANGLES_C + 1))
 
-/* Residual [MSFP_UNKNOWNS] of the balances [N], [N m], body by body: linear, angular. jacobian: [MSFP_UNKNOWNS][count]
- * with respect to `variables`; rates: derivatives of dY/dt, dZ/dt [2 MSFP_NB][count], zeroed by the caller, or NULL. */
+/* Residual [MSFP_UNKNOWNS] of the balances [N], [N m], body by body: linear, angular; then of the contact forces [N].
+ * jacobian: [MSFP_UNKNOWNS][count] with respect to `variables`; rates: derivatives of dY/dt, dZ/dt [2 MSFP_NB][count], zeroed by the caller, or NULL. */
 void msfp_momentum_balances(const msfp_parameters *p, const msfp_point *at, const double *unknowns, msfp_work *w,
                             double *residual, const msfp_variable *variables, int count, double *jacobian,
                             double *rates);

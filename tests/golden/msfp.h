@@ -156,7 +156,7 @@ typedef struct {
 
 /* One column of the Jacobian of the momentum balances. */
 enum msfp_seed_kind {
-    MSFP_SEED_COORDINATE, /* index: body, the base is 0; field: 3 * order + angle */
+    MSFP_SEED_COORDINATE, /* index: body, the base is 0; field: 3 * order + angle; 9 + 3 * order + axis: separation */
     MSFP_SEED_CONTACT,    /* index: surface from 0; field: psi~, theta~, N */
     MSFP_SEED_FRICTION,   /* index: surface from 0; field: Y, Z */
     MSFP_SEED_BASE,       /* field: 3 * order + axis */
@@ -329,8 +329,8 @@ typedef struct msfp_api {
      * at->foot: y - beta^2 y'', y' - beta y''; gain: a memory is its start + at->memory + gain * source. */
     int (*condensed)(const msfp_bearing *bearing, const msfp_inputs *at, double q_weight, double v_weight,
                      double a_weight, double beta, double gain, double *residual, double *tangent, double *found);
-    /* Residual [unknowns] of the momentum balances [N], [N m] at given unknowns, body by body: linear, angular. jacobian
-     * [unknowns][count], of the rates of Y, Z [2 nb][count]. */
+    /* Residual [unknowns] of the momentum balances [N], [N m] at given unknowns, body by body: linear, angular; with
+     * uplift then of the contact forces [N]. jacobian [unknowns][count], of the rates of Y, Z [2 nb][count]. */
     int (*momentum_balances)(const msfp_bearing *bearing, const msfp_inputs *at, const double *unknowns,
                              const msfp_variable *variables, int count, double *residual, double *jacobian,
                              double *rates);

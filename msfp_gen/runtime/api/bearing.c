@@ -168,7 +168,8 @@ int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, doubl
 
 static int valid_variable(const msfp_variable *x)
 {
-    static const int indices[] = { NB + 1, NB, NB, 1, 1 }, fields[] = { 9, 3, 2, 9, 6 };
+    static const int indices[] = { NB + 1, NB, NB, 1, 1 };
+    static const int fields[] = { 3 * MSFP_NQ, 3, 2, 9, 6 };
     return x->kind >= 0 && x->kind <= MSFP_SEED_LOAD && x->index >= 0 && x->index < indices[x->kind] && x->field >= 0
            && x->field < fields[x->kind];
 }

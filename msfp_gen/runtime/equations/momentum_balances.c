@@ -6,9 +6,12 @@
 #include "msfp_kernels.h"
 #include "msfp_schedule.h"
 
+#define LEAST_FORCE 1e-6 /* [N], of generator/body.py */
+
 enum {
     FRICTION = MSFP_FRICTION_SIZE,
-    ROWS = MSFP_BALANCES_SIZE /* of a body */
+    ROWS = MSFP_BALANCES_SIZE, /* of a body */
+    NORMAL_FORCES = NB * (MSFP_ACCELERATIONS + MSFP_ANGLES_C) /* place of the first among the unknowns */
 };
 
 /* Hand the rates of friction on to the steppers, which read them in the blocks of the condensed equations. */
@@ -45,7 +48,10 @@ void msfp_momentum_balances(const msfp_parameters *p, const msfp_point *at, cons
         *msfp_variable_values(w, &s, msfp_unknowns + i) = unknowns[i];
     msfp_balances_values(p, w, &s);
     give_friction_rates(&s, w);
-    memcpy(residual, s.balances[1], MSFP_UNKNOWNS * sizeof *residual);
+    memcpy(residual, s.balances[1], NB * ROWS * sizeof *residual);
+#if MSFP_UPLIFT
+    memcpy(residual + NB * ROWS, s.excess[0], NB * FORCE * sizeof *residual);
+#endif
     for (int first = 0; first < count; first += DOF) {
         msfp_clear_variables(w, &ds);
         for (int i = first; i < count && i < first + DOF; ++i) {
@@ -54,7 +60,10 @@ void msfp_momentum_balances(const msfp_parameters *p, const msfp_point *at, cons
                 columns[i - first] = 1.0;
         }
         msfp_balances_tangents(p, w, &s, &ds);
-        put_columns(ds.balances[1], MSFP_UNKNOWNS, first, count, jacobian);
+        put_columns(ds.balances[1], NB * ROWS, first, count, jacobian);
+#if MSFP_UPLIFT
+        put_columns(ds.excess[0], NB * FORCE, first, count, jacobian + (size_t)NB * ROWS * count);
+#endif
         for (int j = 0; j < NB && rates; ++j)
             put_columns(ds.report_contact[j] + MSFP_REPORT_CONTACT_DY * DOF, FRICTION, first, count,
                         rates + (size_t)2 * j * count);
@@ -66,12 +75,14 @@ static double balance_size(const msfp_parameters *p, const double *unknowns, con
 {
     double load = 1e-9, size = 0.0;
     for (int k = 0; k < NB; ++k)
-        load = fmax(load, fabs(unknowns[NB * (MSFP_ANGLES_A + MSFP_ANGLES_C) + k]));
+        load = fmax(load, fabs(unknowns[NORMAL_FORCES + k]));
     for (int k = 0; k < NB; ++k)
         for (int r = 0; r < ROWS; ++r) {
             const double scale = r < FORCE ? load : load * p->surface[k][MSFP_SURFACE_PARAMETERS_R];
             size = fmax(size, fabs(residual[k * ROWS + r]) / scale);
         }
+    for (int r = NB * ROWS; r < MSFP_UNKNOWNS; ++r) /* contact forces, with uplift */
+        size = fmax(size, fabs(residual[r]) / load);
     return size;
 }
 
@@ -83,16 +94,41 @@ static void first_guess(const msfp_parameters *p, const msfp_point *at, double *
     for (int k = NB - 1; k >= 0; --k) {
         load += p->body[k + 1][MSFP_BODY_PARAMETERS_M] * p->gravity;
         for (int i = 0; i < MSFP_ANGLES_C; ++i)
-            unknowns[NB * MSFP_ANGLES_A + k * MSFP_ANGLES_C + i] = at->q[k][MSFP_PLANAR ? 1 : i];
-        unknowns[NB * (MSFP_ANGLES_A + MSFP_ANGLES_C) + k] = load;
+            unknowns[NB * MSFP_ACCELERATIONS + k * MSFP_ANGLES_C + i] = at->q[k][MSFP_PLANAR ? 1 : i];
+        unknowns[NORMAL_FORCES + k] = load;
     }
 }
 
+#if MSFP_UPLIFT
+static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/* First guess of the contacts: the state gives their forces, from which friction inclines the normals a little. */
+static void guess_contacts(const msfp_work *w, double *unknowns)
+{
+    double force[3], t1[3], t2[3], t3[3];
+    for (int k = 0; k < NB; ++k) {
+        msfp_unilateral_F_get(w->unilateral[k], force);
+        msfp_body_t1_get(w->body[k], t1);
+        msfp_body_t2_get(w->body[k], t2);
+        msfp_body_t3_get(w->body[k], t3);
+        const double x = dot(force, t1), y = dot(force, t2), z = dot(force, t3) + LEAST_FORCE;
+        const double size = sqrt(x * x + y * y + z * z), angles[2] = { msfp_atan2(-y, z), msfp_asin(x / size) };
+        for (int i = 0; i < MSFP_ANGLES_C; ++i)
+            unknowns[NB * MSFP_ACCELERATIONS + k * MSFP_ANGLES_C + i] = angles[MSFP_PLANAR ? 1 : i];
+        unknowns[NORMAL_FORCES + k] = size;
+    }
+}
+#endif
+
 static void give_accelerations(const double *unknowns, msfp_point *at)
 {
-    for (int k = 0; k < NB; ++k)
+    for (int k = 0; k < NB; ++k) {
+        const double *found = unknowns + k * MSFP_ACCELERATIONS;
         for (int i = 0; i < MSFP_ANGLES_A; ++i)
-            at->a[k][MSFP_PLANAR ? 1 : i] = unknowns[k * MSFP_ANGLES_A + i];
+            at->a[k][MSFP_PLANAR ? 1 : i] = found[i];
+        for (int i = MSFP_ANGLES_A; i < MSFP_ACCELERATIONS; ++i)
+            at->a[k][3 + (MSFP_PLANAR ? 2 * (i - MSFP_ANGLES_A) : i - MSFP_ANGLES_A)] = found[i];
+    }
 }
 
 int msfp_solve_momentum_balances(const msfp_parameters *p, msfp_point *at, msfp_work *w, double *unknowns, int warm,
@@ -100,8 +136,13 @@ int msfp_solve_momentum_balances(const msfp_parameters *p, msfp_point *at, msfp_
 {
     double residual[MSFP_UNKNOWNS], jacobian[MSFP_UNKNOWNS * MSFP_UNKNOWNS];
     int pivots[MSFP_UNKNOWNS];
-    if (!warm)
+    if (!warm) {
         first_guess(p, at, unknowns);
+#if MSFP_UPLIFT
+        msfp_momentum_balances(p, at, unknowns, w, residual, NULL, 0, NULL, NULL);
+        guess_contacts(w, unknowns);
+#endif
+    }
     double last = INFINITY;
     out->determinant = 1;
     for (out->iterations = 0; out->iterations < 30; ++out->iterations) {

@@ -58,7 +58,7 @@ def run_library(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
     """
     require_base_motion_only(scene)
     if scene.modelled.uplift:
-        raise InputError("effects.uplift: as_ode keeps all surfaces in contact")
+        raise InputError("effects.uplift: library integrators are compared without it; leave it out")
     ode = build_model(scene.bearing.layout, scene.modelled).as_ode(scene.bearing, scene.motion, scene.top)
     from scipy import integrate  # imported before timing starts
 
