@@ -18,7 +18,7 @@ from typing import Any
 from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.output import write_bytes
 from msfp_gen.common.version import __version__
-from msfp_gen.embedding import values
+from msfp_gen.embedding import fortran, values
 from msfp_gen.generator.interface import ABI_VERSION, CALL_ERRORS, effects_text, model_name, surface_values
 from msfp_gen.jit.build import ENTRY
 from msfp_gen.jit.compiler import FLAGS
@@ -130,6 +130,8 @@ def _content(models: dict[str, ModelSpec], platform: Platform, target: str | Non
         "top": contract.names(contract.TOP),
         "words": word_enums(),
         "types": interface.fortran(public_header()),
+        "interfaces": fortran.interfaces(public_header()),
+        "functions": interface.functions(public_header()),
         "errors": CALL_ERRORS,
         "static": STATIC,
         "platform": platform,

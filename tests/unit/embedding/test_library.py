@@ -313,6 +313,58 @@ def test_the_fortran_module_has_the_types_of_the_header(prefix: Path) -> None:
     assert enumerated - seeds <= set(constants) and len(enumerated) > 50
 
 
+def test_the_fortran_module_has_the_functions_of_the_header(prefix: Path) -> None:
+    """Their parameters by name and order, and whether C takes the value."""
+    header = re.sub(r"/\*.*?\*/", "", (prefix / "include/msfp.h").read_text(encoding="utf-8"), flags=re.DOTALL)
+    module = re.sub(r"&\n\s*", "", (prefix / "share/msfp/msfp.f90").read_text(encoding="utf-8"))
+    api = header.partition("typedef struct msfp_api {")[2].partition("} msfp_api;")[0]
+    functions = re.findall(r"\(\*(\w+)\)\(([^)]*)\);", api)
+    assert functions
+    for name, parameters in functions:
+        given = [" ".join(text.split()) for text in parameters.split(",")]
+        found = re.search(rf"(?:function|subroutine) f_{name}\(([^)]*)\) bind\(c\)(.*?)end ", module, re.DOTALL)
+        assert found, name
+        assert found[1].replace(" ", "").split(",") == [re.split(r"[ *]", text)[-1] for text in given], name
+        for text in given:
+            kind, word = text.removeprefix("const ").split(" ")[0], re.split(r"[ *]", text)[-1]
+            (declared,) = re.findall(rf"(\S+), .*:: {word}(?:\(\*\))?$", found[2], re.MULTILINE)
+            scalar = {"int": "c_int", "long": "c_long", "double": "c_double", "size_t": "c_size_t"}.get(kind)
+            assert scalar is None or declared.endswith(f"({scalar})"), text
+            assert (f":: {word}(*)" in found[2]) <= ("*" in text), text
+        assert f"procedure(f_{name}), pointer, nopass :: {name} =>" in module
+        assert f"call c_f_procpointer(model%api%{name}, model%{name})" in module
+
+
+LEFT_OUT = """program left_out
+   use msfp
+   implicit none
+   type(msfp_model) :: model
+   type(msfp_method_stages) :: method
+   type(c_ptr) :: bearing, message
+   integer(c_int) :: status
+   model = msfp_load(msfp_3_1_1())
+   status = model%bearing_new(9.8d0, bearing=bearing, message=message)
+   print "(2a)", msfp_string(model%status_name(status)), ": " // msfp_string(message)
+   status = model%port_method(MSFP_METHOD_IMPLICIT, method)
+   print "(i0, f8.4)", method%count, method%diagonal
+end program left_out
+"""
+
+
+@needs("pkg-config", "gfortran")
+def test_an_argument_that_fortran_leaves_out_is_null(prefix: Path, tmp_path: Path) -> None:
+    (tmp_path / "left_out.f90").write_text(LEFT_OUT, encoding="utf-8")
+    environment = {"PKG_CONFIG_PATH": str(prefix / "lib" / "pkgconfig")}
+    library = run(["pkg-config", "--libs", "msfp"], tmp_path, **environment).split()
+    module = str(prefix / "share/msfp/msfp.f90")
+    flags = "-std=f2018 -Wall -Werror -pedantic -fcheck=all".split()
+    command = ["gfortran", *flags, module, "left_out.f90", *library, f"-Wl,-rpath,{prefix / 'lib'}", "-o", "left_out"]
+    run(command, tmp_path)
+    refused, method = run(["./left_out"], tmp_path).splitlines()
+    assert refused.startswith("argument: ") and "bodies" in refused
+    assert method.split() == ["3", f"{1 - 2**-0.5:.4f}"]
+
+
 def test_every_line_of_the_fortran_files_fits(prefix: Path) -> None:
     for name in ("msfp.f90", "examples/example.f90"):
         lines = (prefix / "share/msfp" / name).read_text(encoding="utf-8").splitlines()
