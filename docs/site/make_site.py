@@ -100,17 +100,19 @@ def help_of(*command: str) -> str:
 
 
 def write_gallery(folder: Path) -> None:
-    """A script for every scene and every notebook in examples/, for sphinx-gallery to run."""
+    """A script for every scene, notebook and library in examples/, for sphinx-gallery to run."""
     folder.mkdir()
     title = "Examples"
     (folder / "GALLERY_HEADER.rst").write_text(
-        f"{title}\n{'=' * len(title)}\n\nThe scenes and notebooks in `examples/`, run.\n"
+        f"{title}\n{'=' * len(title)}\n\nThe scenes, notebooks and programs in `examples/`, run.\n"
     )
     (folder / "examples").mkdir()  # sphinx-gallery runs a script where it lies
     for path in (*sorted((ROOT / "examples").glob("*.toml")), ROOT / "examples" / "building" / "building.toml"):
         (folder / path.relative_to(ROOT)).parent.mkdir(exist_ok=True)
         shutil.copy(path, folder / path.relative_to(ROOT))
         (folder / f"plot_{path.stem}.py").write_text(scene_script(path), encoding="utf-8")
+    for name in ("pareto", "sobol"):
+        shutil.copy(ROOT / "examples" / "libraries" / f"{name}.py", folder / f"plot_{name}.py")
     for path in sorted((ROOT / "examples").glob("*.ipynb")):
         (folder / f"plot_{path.stem}.py").write_text(notebook_script(path), encoding="utf-8")
 

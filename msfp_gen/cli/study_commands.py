@@ -1,4 +1,4 @@
-"""Commands for studies of many runs: study, with the subcommands that run, watch, evaluate and search."""
+"""Commands for studies of many runs: study, with the subcommands that run, watch and evaluate."""
 
 from __future__ import annotations
 
@@ -81,9 +81,6 @@ def run(
     workers: Workers = None,
     threads: Threads = False,
     dask: Dask = None,
-    mpi: Annotated[
-        bool, typer.Option("--mpi", help="Run on MPI processes: mpiexec -n N python -m mpi4py.futures -m msfp_gen ...")
-    ] = False,
     shard: Annotated[
         str | None, typer.Option(metavar="I/N", help="Only every N-th chunk, from the I-th; for arrays of jobs.")
     ] = None,
@@ -122,7 +119,7 @@ def run(
     question = {
         "quantity": estimate, "statistic": statistic, "threshold": threshold, "target": target, "budget": budget,
     }  # fmt: skip
-    engine: dict[str, Any] = {"workers": workers, "threads": threads, "dask": dask, "mpi": mpi}
+    engine: dict[str, Any] = {"workers": workers, "threads": threads, "dask": dask}
     if "accuracy" in definition.table or any(value is not None for value in question.values()):
         if shard is not None:
             raise InputError("--shard: the runs of an estimate depend on those before; give --workers or --dask")
@@ -274,28 +271,6 @@ def tornado(
     _finish(asdict(result), table, rows, partial(draw, result), (plot, output, as_json))
 
 
-@group.command(epilog="Examples:\n\n\b\n  msfp-gen study sobol out --quantity peak_displacement --plot sobol.png")
-def sobol(
-    folder: Folder,
-    quantity: Quantity,
-    statistic: Statistic = "median",
-    level: Level = 0.95,
-    plot: Plot = None,
-    output: Output = None,
-    as_json: AsJson = False,
-) -> None:
-    """First-order and total Sobol' indices of a quantity; for `sampling.method = "sobol-indices"`, with SALib."""
-    from msfp_gen.studies.assessment import sensitivity as module
-
-    _check(plot, output)
-    result = module.sobol(folder, quantity, statistic, level)
-    columns = ("axes", "first", "first_interval", "total", "total_interval")
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*(getattr(result, c) for c in columns), strict=True)]
-    _finish(
-        asdict(result), module.sobol_table(result), rows, partial(module.plot_sobol, result), (plot, output, as_json)
-    )
-
-
 def _check(plot: Path | None, output: Path | None) -> None:
     """Refuse paths that cannot be written before anything is read."""
     if plot is not None:
@@ -323,56 +298,3 @@ def _finish(
     if plot is not None:
         draw(plot)
         note(f"wrote {plot}")
-
-
-@group.command(
-    epilog="Examples:\n\n\b\n  msfp-gen study pareto study.toml -o search --minimise peak_displacement "
-    "--minimise peak_force_ratio\n"
-    "  msfp-gen study pareto study.toml -o search --minimise peak_force_ratio --maximise effective_damping "
-    "--at-most peak_sliding_1=0.12 --plot front.png"
-)
-def pareto(
-    source: Annotated[Path, typer.Argument(metavar="FILE", help="A study file (TOML); random axes are the variables.")],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of the search: designs.parquet, and all runs.")
-    ],
-    minimise: Annotated[list[str] | None, typer.Option(metavar="COLUMN", help="An objective; may be repeated.")] = None,
-    maximise: Annotated[list[str] | None, typer.Option(metavar="COLUMN", help="An objective; may be repeated.")] = None,
-    at_most: Annotated[
-        list[str] | None, typer.Option(metavar="COLUMN=VALUE", help="A limit of feasible designs; may be repeated.")
-    ] = None,
-    population: Annotated[int, typer.Option(metavar="NUMBER", help="Designs of a generation.")] = 32,
-    generations: Annotated[int, typer.Option(metavar="NUMBER", help="Generations, the first included.")] = 20,
-    seed: Annotated[int, typer.Option(metavar="NUMBER", help="Of the search.")] = 0,
-    statistic: Statistic = "max",
-    workers: Workers = None,
-    threads: Threads = False,
-    dask: Dask = None,
-    plot: Plot = None,
-    as_json: AsJson = False,
-) -> None:
-    """Search the random axes of a study for the Pareto front of its quantities, by NSGA-II of pymoo."""
-    from msfp_gen.studies.assessment.pareto import DESIGNS, Goals, front_table, plot_pareto
-    from msfp_gen.studies.assessment.pareto import pareto as search
-
-    _check(plot, None)
-    goals = Goals(tuple(minimise or ()), tuple(maximise or ()), dict(map(_limit, at_most or ())), statistic)
-    with Progress(f"{generations} generations") as progress:
-        front = search(
-            source, output, goals, population=population, generations=generations, seed=seed, progress=progress,
-            workers=workers, threads=threads, dask=dask,
-        )  # fmt: skip
-    answer(front.designs[front.designs.front].to_dict("records"), [front_table(front)], as_json)
-    note(f"wrote {output / DESIGNS}")
-    if plot is not None:
-        plot_pareto(front, plot)
-        note(f"wrote {plot}")
-
-
-def _limit(text: str) -> tuple[str, float]:
-    """Column and value of COLUMN=VALUE. Raises InputError."""
-    name, _, value = text.partition("=")
-    try:
-        return name, float(value)
-    except ValueError:
-        raise InputError(f"--at-most = {text!r}: give a column and a number, such as peak_sliding_1=0.12") from None

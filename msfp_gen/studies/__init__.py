@@ -13,13 +13,8 @@ if TYPE_CHECKING:
     from msfp_gen.studies.assessment.fragility import plot_fragility as plot_fragility
     from msfp_gen.studies.assessment.ida import ida as ida
     from msfp_gen.studies.assessment.ida import plot_ida as plot_ida
-    from msfp_gen.studies.assessment.pareto import Goals as Goals
-    from msfp_gen.studies.assessment.pareto import pareto as pareto
-    from msfp_gen.studies.assessment.pareto import plot_pareto as plot_pareto
     from msfp_gen.studies.assessment.rows import read_study as read_study
-    from msfp_gen.studies.assessment.sensitivity import plot_sobol as plot_sobol
     from msfp_gen.studies.assessment.sensitivity import plot_tornado as plot_tornado
-    from msfp_gen.studies.assessment.sensitivity import sobol as sobol
     from msfp_gen.studies.assessment.sensitivity import tornado as tornado
     from msfp_gen.studies.definition import load_study as load_study
     from msfp_gen.studies.estimation.estimate import Estimate as Estimate
@@ -32,20 +27,15 @@ if TYPE_CHECKING:
 # Public name -> the module that defines it.
 _MODULES = {
     "Outcome": "run",
-    "Goals": "assessment.pareto",
     "Estimate": "estimation.estimate",
     "estimate": "estimation.estimate",
     "plot_estimate": "estimation.estimate",
     "fragility": "assessment.fragility",
     "ida": "assessment.ida",
     "read_study": "assessment.rows",
-    "sobol": "assessment.sensitivity",
     "tornado": "assessment.sensitivity",
     "plot_fragility": "assessment.fragility",
     "plot_ida": "assessment.ida",
-    "pareto": "assessment.pareto",
-    "plot_pareto": "assessment.pareto",
-    "plot_sobol": "assessment.sensitivity",
     "plot_tornado": "assessment.sensitivity",
     "Status": "run",
     "load_study": "definition",

@@ -44,7 +44,6 @@ METHODS = {
     "latin-hypercube": "one value in each of `samples` intervals of equal probability, for each axis",
     "random": "independent values",
     "sobol-sequence": "a scrambled Sobol' sequence; give a power of two",
-    "sobol-indices": "the (axes + 2) x `samples` values that Sobol' indices need (`msfp-gen study sobol`)",
     "one-at-a-time": "medians, and each axis alone at two quantiles (`msfp-gen study tornado`)",
     "listed": "the rows of `values`, one value for each axis",
 }
@@ -176,14 +175,8 @@ class Sampling:
             raise InputError(
                 f"sampling.samples = {count}: a Sobol' sequence needs a power of two; give {near[0]} or {near[1]}"
             )
-        elif self.method == "sobol-sequence":
+        else:
             rows = qmc.Sobol(axes, rng=rng).random(count)
-        else:  # rows A, A with one column of B for each axis, B, for each sample: the order that SALib analyses
-            first, second = np.hsplit(qmc.Sobol(2 * axes, rng=rng).random(count), 2)
-            blocks = np.repeat(first[:, None, :], axes + 2, axis=1)
-            blocks[:, range(1, axes + 1), range(axes)] = second
-            blocks[:, -1] = second
-            rows = blocks.reshape(-1, axes)
         return np.asarray(np.clip(rows, *WITHIN))
 
 

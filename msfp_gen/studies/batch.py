@@ -1,7 +1,7 @@
 """Pools of workers, and batches of scenes: scenes come in, results go out as the runs end (docs/batch.md).
 
 Studies run their chunks on the same pools. A pool is an executor in the sense of `concurrent.futures`: threads or
-processes of this machine, an executor of the caller, Dask or MPI.
+processes of this machine, an executor of the caller, or Dask.
 """
 
 from __future__ import annotations
@@ -171,10 +171,9 @@ def pool_from(
     threads: bool = False,
     executor: Executor | None = None,
     dask: str | None = None,
-    mpi: bool = False,
 ) -> AbstractContextManager[Pool]:
     """The pool for these arguments, as of `study`. Raises InputError where they name two engines."""
-    engines = {"executor": executor, "dask": dask, "mpi": mpi, "threads": threads}
+    engines = {"executor": executor, "dask": dask, "threads": threads}
     named = [name for name, value in engines.items() if value]
     if len(named) > 1:
         raise InputError(f"{named[0]} and {named[1]}: give one engine")
@@ -183,7 +182,7 @@ def pool_from(
         return nullcontext(Pool(executor, lambda: AHEAD * count, type(executor).__name__))
     if dask is not None:
         return dask_pool(dask)
-    return mpi_pool() if mpi else local_pool(workers, processes=not threads)
+    return local_pool(workers, processes=not threads)
 
 
 @contextmanager
@@ -230,29 +229,6 @@ def dask_pool(address: str) -> Iterator[Pool]:
         yield Pool(executor, lambda: AHEAD * max(1, sum(client.ncores().values())), f"Dask at {address}")
     finally:
         client.close()
-
-
-@contextmanager
-def mpi_pool() -> Iterator[Pool]:
-    """The worker processes of `mpiexec -n N python -m mpi4py.futures -m msfp_gen ...`. Raises InputError."""
-    require("mpi4py", "mpi", "--mpi")
-    try:
-        from mpi4py import MPI
-        from mpi4py.futures import MPIPoolExecutor
-    except (ImportError, RuntimeError) as error:
-        first = str(error).partition("\n")[0]
-        raise InputError(f"--mpi: {first}; install an MPI library, such as MPICH or Open MPI") from None
-    count = MPI.COMM_WORLD.Get_size() - 1
-    if count < 1:
-        raise InputError(
-            "--mpi: this is one process; start it as mpiexec -n 8 python -m mpi4py.futures -m msfp_gen ..."
-        )
-    with MPIPoolExecutor() as executor:
-        try:
-            yield Pool(executor, lambda: AHEAD * count, "MPI")
-        except BaseException:
-            executor.shutdown(wait=False, cancel_futures=True)
-            raise
 
 
 def require(module: str, extra: str, what: str) -> None:

@@ -391,35 +391,23 @@ def example_text() -> str:
     return (resources.files(__package__) / "example.toml").read_text(encoding="utf-8")
 
 
-def load_study(
-    source: str | Path | Mapping[str, Any], progress: Progress | None = None, *, design: bool = False
-) -> Study:
+def load_study(source: str | Path | Mapping[str, Any], progress: Progress | None = None) -> Study:
     """Read and check the study in a TOML file, or in a table of the same keys. Paths in a file are relative to it.
 
-    progress: of the scaling of a suite of records. design: whether to try both ends of each random axis in place of
-    `[sampling]`, at the start of a search. Raises InputError of one line that names the file, the path of the field,
-    the value and the remedy.
+    progress: of the scaling of a suite of records. Raises InputError of one line that names the file, the path of the
+    field, the value and the remedy.
     """
     if isinstance(source, Mapping):
-        return _study(source, None, progress, design)
+        return _study(source, None, progress)
     path = Path(source)
     if not is_input(path):
         raise InputError(f"study = {str(source)!r}: no such file; `msfp-gen study --example` prints one to start from")
     with prefixed(f"{path}: "):
-        return _study(toml_file(path), path.parent, progress, design)
+        return _study(toml_file(path), path.parent, progress)
 
 
-def _for_search(table: Mapping[str, Any]) -> Table:
-    """The table of a study with random axes at both ends, so that designs without a scene fail before the search."""
-    ends = {"method": "one-at-a-time", "quantiles": [1e-9, 1 - 1e-9]}
-    random = any(isinstance(axis, Mapping) and "distribution" in axis for axis in _table(table, "axes").values())
-    rest = {key: value for key, value in table.items() if key != "sampling"}
-    return {**rest, "sampling": ends} if random else rest
-
-
-def _study(table: Mapping[str, Any], folder: Path | None, progress: Progress | None, design: bool) -> Study:
+def _study(table: Mapping[str, Any], folder: Path | None, progress: Progress | None) -> Study:
     check_whole_numbers(table)
-    table = _for_search(table) if design else table
     known_keys(table, KEYS, "")
     if "scene" not in table:
         raise InputError(f"scene is missing: give {KEYS['scene']}")

@@ -76,7 +76,6 @@ def study(
     threads: bool = False,
     executor: Executor | None = None,
     dask: str | None = None,
-    mpi: bool = False,
     shard: tuple[int, int] = (1, 1),
     progress: Progress | None = None,
 ) -> Outcome:
@@ -91,9 +90,8 @@ def study(
         output: the folder of the study, for `part-*.parquet` and `study.toml`; made if it does not exist.
         workers: runs at the same time; None: one for each core.
         threads: threads instead of processes: they start at once, and suit few and long runs.
-        executor: an executor (`concurrent.futures`) to run on, such as that of Parsl; it stays open.
+        executor: an executor (`concurrent.futures`) to run on, such as that of mpi4py or Parsl; it stays open.
         dask: address or scheduler file of a Dask cluster to run on.
-        mpi: run on the other processes of `mpiexec ... -m mpi4py.futures`.
         shard: (i, n): only every n-th chunk, from the i-th; for job arrays that share `output`.
         progress: called with the number of runs done, by earlier calls too, and the number of runs of the shard.
 
@@ -102,7 +100,7 @@ def study(
     """
     _check_shard(shard)
     definition = source if isinstance(source, Study) else load_study(source)
-    with pool_from(workers, threads, executor, dask, mpi) as pool:
+    with pool_from(workers, threads, executor, dask) as pool:
         return run_on(pool, definition, Path(output), shard, progress)
 
 

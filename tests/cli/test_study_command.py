@@ -98,7 +98,7 @@ def test_the_example_can_be_loaded(tmp_path: Any, capsys: pytest.CaptureFixture[
         (["none.toml", "-o", "out"], "none.toml.*no such file"),
         (["study.toml", "-o", "out", "--shard", "3/2"], "shard = '3/2': give i/n"),
         (["study.toml", "-o", "out", "--shard", "x"], "--shard = 'x': give i/n"),
-        (["study.toml", "-o", "out", "--threads", "--mpi"], "mpi and threads: give one engine"),
+        (["study.toml", "-o", "out", "--threads", "--dask", "a"], "dask and threads: give one engine"),
         (["study.toml", "-o", "out", "--workers", "0"], "workers = 0"),
         (["status", "out"], "no study.toml here"),
     ],

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import re
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -57,3 +61,30 @@ def test_the_example_of_a_building_stays_within_the_limits_of_its_bearings() -> 
     result = simulate(replace(scene, duration=12.0))
     assert result.succeeded and not result.notes and not result.verdict.exceeded
     assert f"#     msfp-gen run {path.relative_to(ROOT)} --plot building.png\n" in path.read_text(encoding="utf-8")
+
+
+def output_of(name: str) -> str:
+    """What an example with a library prints."""
+    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+    environment = {**os.environ, "MPLBACKEND": "agg", "PYTHONPATH": path}
+    command = [sys.executable, str(EXAMPLES / "libraries" / f"{name}.py")]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_indices_by_salib() -> None:
+    """Test 1 is a cycle of constant friction: the peak force is friction times load, and a little by the radii."""
+    pytest.importorskip("SALib")
+    found = dict(re.findall(r"^(\w+) +first order -?[\d.]+, total ([\d.]+)$", output_of("sobol"), re.MULTILINE))
+    friction, radius, load = (float(found[name]) for name in ("friction", "radius", "load"))
+    assert friction > load > 3 * radius and 0.9 < friction + radius + load < 1.3
+
+
+def test_front_by_pymoo() -> None:
+    """No design of the front is worse than another in both objectives."""
+    pytest.importorskip("pymoo")
+    rows = re.findall(r": +([\d.]+) mm, +([\d.]+) kN$", output_of("pareto"), re.MULTILINE)
+    displacement, force = np.array(rows, dtype=float).T
+    assert len(rows) > 3 and np.all(np.diff(displacement) >= 0) and np.all(np.diff(force) <= 0)
+    assert force[0] > 1.2 * force[-1]

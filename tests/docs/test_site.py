@@ -108,7 +108,7 @@ def test_gallery_runs_every_example(tmp_path: Path) -> None:
     check_site(tmp_path / "site")
     examples = {path.stem for path in (ROOT / "examples").iterdir() if path.suffix in (".toml", ".ipynb")}
     shown = {path.stem.removeprefix("plot_") for path in (tmp_path / "site" / "gallery").glob("plot_*.html")}
-    assert examples | {"building"} == shown
+    assert examples | {"building", "pareto", "sobol"} == shown
     for path in (tmp_path / "site" / "gallery").glob("plot_*.html"):
         page = path.read_text(encoding="utf-8")
         assert f"_images/sphx_glr_{path.stem}_001.png" in page, f"{path.name} has no figure"

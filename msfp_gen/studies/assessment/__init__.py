@@ -1,1 +1,1 @@
-"""Evaluation of the rows of a study: IDA curves, fragility, sensitivity, Pareto fronts, figures (docs/studies.md)."""
+"""Evaluation of the rows of a study: IDA curves, fragility, tornado, figures (docs/studies.md)."""

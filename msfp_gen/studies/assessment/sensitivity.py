@@ -1,4 +1,4 @@
-"""Sensitivity of a quantity to the random axes, from the rows of a study: tornado and Sobol' indices."""
+"""Sensitivity of a quantity to the random axes, from the rows of a study: tornado."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from msfp_gen.figures.style import COLOURS, INK, THIN, headline, page
 from msfp_gen.studies.assessment.rows import (
     SIZE,
     STATISTICS,
-    check_share,
     complete,
     labelled,
     numbers,
@@ -23,7 +22,6 @@ from msfp_gen.studies.assessment.rows import (
     unit_of,
 )
 from msfp_gen.studies.axes import Sampling
-from msfp_gen.studies.batch import require
 from msfp_gen.studies.run import study_table
 
 if TYPE_CHECKING:
@@ -63,31 +61,6 @@ class Tornado:
     quantiles: tuple[float, float]
     base: float
     bars: tuple[Bar, ...]
-
-
-@dataclass(frozen=True)
-class Sobol:
-    """Result of `sobol`.
-
-    Attributes:
-        name, unit, statistic: of the quantity.
-        axes: names of the random axes, by falling total index.
-        first, total: first-order and total index of each axis [-].
-        first_interval, total_interval: half the widths of the confidence intervals of these indices [-].
-        level: of confidence [-].
-        samples: number of base samples.
-    """
-
-    name: str
-    unit: str
-    statistic: str
-    axes: tuple[str, ...]
-    first: tuple[float, ...]
-    total: tuple[float, ...]
-    first_interval: tuple[float, ...]
-    total_interval: tuple[float, ...]
-    level: float
-    samples: int
 
 
 def by_sample(folder: str | Path, name: str, statistic: str, method: str) -> Any:
@@ -135,33 +108,6 @@ def tornado(folder: str | Path, name: str, statistic: str = "median") -> Tornado
     return Tornado(name, samples.attrs["unit"], statistic, (low, high), float(values[0, -1]), tuple(bars))
 
 
-def sobol(folder: str | Path, name: str, statistic: str = "median", level: float = 0.95, seed: int = 0) -> Sobol:
-    """First-order and total Sobol' indices of a quantity, by SALib (`msfp-gen[salib]`).
-
-    folder: of a study with `sampling.method = "sobol-indices"`. statistic: as of `tornado`. level, seed: of the
-    confidence intervals, which SALib computes by a bootstrap. Raises InputError.
-    """
-    require("SALib", "salib", "Sobol' indices")
-    from SALib.analyze import sobol as analysis
-
-    check_share("level", level)
-    samples = by_sample(folder, name, statistic, "sobol-indices")
-    values = samples[name].to_numpy()
-    if not np.ptp(values):
-        raise InputError(f"{name}: it has the same value in all samples; give another quantity")
-    names = list(samples.columns[:-1])
-    problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
-    indices = analysis.analyze(
-        problem, values, calc_second_order=False, conf_level=level, print_to_console=False, seed=seed
-    )
-    order = np.argsort(-np.asarray(indices["ST"]), kind="stable")
-    first, total, of_first, of_total = (
-        tuple(np.asarray(indices[key])[order].tolist()) for key in ("S1", "ST", "S1_conf", "ST_conf")
-    )
-    axes, base = tuple(names[k] for k in order), len(values) // (len(names) + 2)
-    return Sobol(name, samples.attrs["unit"], statistic, axes, first, total, of_first, of_total, level, base)
-
-
 def tornado_table(result: Tornado) -> Table:
     """The bars as a table for a terminal."""
     rows = [
@@ -174,19 +120,6 @@ def tornado_table(result: Tornado) -> Table:
         f"{result.statistic} of {result.name}: {result.base:.4g}{unit} at medians; each axis at {low:g} and {high:g}"
     )
     return Table(title, ("axis", "low", "high", "at low", "at high", "swing"), rows)
-
-
-def sobol_table(result: Sobol) -> Table:
-    """The indices as a table for a terminal."""
-    columns = (result.first, result.first_interval, result.total, result.total_interval)
-    rows = [
-        (axis, f"{first:.3f}", f"± {of_first:.3f}", f"{total:.3f}", f"± {of_total:.3f}")
-        for axis, first, of_first, total, of_total in zip(result.axes, *columns, strict=True)
-    ]
-    title = (
-        f"Sobol' indices of the {result.statistic} of {result.name}, {result.samples} samples, {100 * result.level:g} %"
-    )
-    return Table(title, ("axis", "first order", "", "total", ""), rows)
 
 
 def plot_tornado(result: Tornado, path: str | Path | None = None, title: str = "") -> Figure:
@@ -209,25 +142,4 @@ def plot_tornado(result: Tornado, path: str | Path | None = None, title: str = "
         axes.margins(x=0.12)
         axes.grid(visible=False, axis="y")
         axes.set_xlabel(f"{result.statistic} of {labelled(result.name, scale.unit)}")
-    return figure
-
-
-def plot_sobol(result: Sobol, path: str | Path | None = None, title: str = "") -> Figure:
-    """Sobol' indices of every axis with confidence intervals, the largest total on top. path: as of `page`."""
-    count = len(result.axes)
-    with page(SIZE[0], 1.6 + 0.5 * count, path) as figure:
-        headline(figure, title or f"Sobol' indices of {labelled(result.name, '')}")
-        axes = figure.subplots()
-        places = np.arange(count)[::-1]
-        drawn: list[tuple[str, Any, Any, float]] = [
-            ("first order", result.first, result.first_interval, 0.18),
-            ("total", result.total, result.total_interval, -0.18),
-        ]
-        for (label, values, errors, shift), colour in zip(drawn, COLOURS, strict=False):
-            axes.barh(places + shift, values, height=0.32, color=colour, label=label)
-            axes.errorbar(values, places + shift, xerr=errors, fmt="none", ecolor=INK, elinewidth=THIN, capsize=2)
-        axes.set_yticks(places, [labelled(name, "") for name in result.axes])
-        axes.grid(visible=False, axis="y")
-        axes.set_xlabel(f"share of the variance of the {result.statistic} of {labelled(result.name, '')}")
-        axes.legend(loc="lower right")
     return figure

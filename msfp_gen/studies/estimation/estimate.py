@@ -218,7 +218,6 @@ def estimate(
     threads: bool = False,
     executor: Executor | None = None,
     dask: str | None = None,
-    mpi: bool = False,
     progress: Any = None,
 ) -> Estimate:
     """Estimate a statistic of a quantity over the draws of a study, with few exact runs.
@@ -227,7 +226,7 @@ def estimate(
     The folder is the folder of a study with the exact runs; the runs of each cheaper model are a study in a folder
     within it. The same call continues an interrupted estimate.
 
-    source, workers, threads, executor, dask, mpi: as of `study`. folder: of the study. quantity to seed: as in
+    source, workers, threads, executor, dask: as of `study`. folder: of the study. quantity to seed: as in
     `Question`, by default the keys of `[accuracy]` in the study file; target and budget also as texts, such as "2 %"
     and "10 min". progress: called with the name of a model and a number of draws before the runs of these draws.
 
@@ -245,7 +244,7 @@ def estimate(
     scales, unit = _scales(study, question)
     existed = Path(folder).exists()
     try:
-        with pool_from(workers, threads, executor, dask, mpi) as pool:
+        with pool_from(workers, threads, executor, dask) as pool:
             runs = StudySource(study, Path(folder), question.quantity, levels, question.seed, pool, progress)
             if scales is not None:
                 result = fragility_of(runs, question, scales, lambda draws: np.log(runs.draws.intensity(draws)))

@@ -1,4 +1,4 @@
-"""Evaluation of studies: fractiles, fragility and its bands, tornado, Sobol' indices, figures and commands."""
+"""Evaluation of studies: fractiles, fragility and its bands, tornado, figures and commands."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from support.study_tables import cheap_study
 import msfp_gen
 from msfp_gen import InputError
 from msfp_gen.cli import main
-from msfp_gen.studies import fragility, ida, read_study, sobol, tornado
-from msfp_gen.studies.assessment import sensitivity
+from msfp_gen.studies import fragility, ida, read_study, tornado
 from msfp_gen.studies.assessment.fragility import fragility_frame
 from msfp_gen.studies.assessment.rows import chosen_rows
 
@@ -241,31 +240,15 @@ def test_a_tornado_has_each_axis_alone(one_at_a_time: Path) -> None:
 
 
 def test_sensitivity_needs_its_sampling_and_all_runs(one_at_a_time: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"needs a study with sampling.method = 'sobol-indices'"):
-        sensitivity.by_sample(one_at_a_time, "found", "median", "sobol-indices")
+    msfp_gen.study(cheap_study(), tmp_path / "other", threads=True)
+    with pytest.raises(InputError, match=r"needs a study with sampling.method = 'one-at-a-time'"):
+        tornado(tmp_path / "other", "peak_displacement")
     with pytest.raises(InputError, match="statistic = 'mode': give one of median"):
         tornado(one_at_a_time, "found", "mode")
     table = cheap_study(sampling={"method": "one-at-a-time"}, chunk=2)
-    msfp_gen.study(table, tmp_path, threads=True, shard=(1, 2))
+    msfp_gen.study(table, tmp_path / "half", threads=True, shard=(1, 2))
     with pytest.raises(InputError, match="4 of 6 runs are done; complete the study"):
-        tornado(tmp_path, "peak_displacement")
-
-
-def test_sobol_indices_are_those_of_ishigami(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The rows of the sampling, in the order that SALib analyses; the function has known indices."""
-    pytest.importorskip("SALib")
-    from msfp_gen.studies.axes import Sampling
-
-    shares = Sampling("sobol-indices", 4096, seed=1).shares(3)
-    x = np.pi * (2 * shares - 1)
-    y = np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
-    given = pd.DataFrame(x, columns=["a", "b", "c"]).assign(y=y)
-    given.attrs["unit"] = ""
-    monkeypatch.setattr(sensitivity, "by_sample", lambda *_: given)
-    found = sobol(tmp_path, "y")
-    assert found.axes == ("a", "b", "c") and found.samples == 4096
-    np.testing.assert_allclose(found.first, [0.3139, 0.4424, 0.0], atol=0.02)
-    np.testing.assert_allclose(found.total, [0.5576, 0.4424, 0.2437], atol=0.02)
+        tornado(tmp_path / "half", "peak_displacement")
 
 
 def test_rows_open_in_pandas_and_duckdb(one_at_a_time: Path) -> None:
@@ -314,20 +297,3 @@ def test_commands_print_write_and_draw(
     assert {path.name for path in tmp_path.iterdir()} == {"f.png", "f.csv", "i.svg", "i.parquet", "t.pdf"}
     assert main(["study", "fragility", *place, "--thresholds", "1", "--plot", "f.gif"]) == 2
     assert "--plot = 'f.gif'" in capsys.readouterr().err
-
-
-def test_sobol_needs_its_library_or_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("SALib")
-    axes = {"a": FREE, "b": FREE}
-    sampling = {"method": "sobol-indices", "samples": 8}
-    msfp_gen.study(cheap_study(axes=axes, quantities={"y": "4 * a + b"}, sampling=sampling), tmp_path, threads=True)
-    figure = tmp_path / "sobol.png"
-    assert main(["study", "sobol", str(tmp_path), "--quantity", "y", "--plot", str(figure)]) == 0
-    shown = capsys.readouterr().out.splitlines()
-    assert shown[2].split()[0] == "a" and figure.stat().st_size > 5000
-
-
-def test_a_missing_library_is_named(one_at_a_time: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("msfp_gen.studies.batch.find_spec", lambda _: None)
-    with pytest.raises(InputError, match=r"Sobol' indices needs SALib; pip install 'msfp-gen\[salib\]'"):
-        sobol(one_at_a_time, "found")

@@ -1,4 +1,4 @@
-"""Studies on every pool: rows are those of runs one by one, on threads, processes, Dask and MPI.
+"""Studies on every pool: rows are those of runs one by one, on threads, processes, executors and Dask.
 
 Random studies run one after the other on the same workers: their files have the same names and other contents in every
 study, in one folder or in several.
@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from support import ROOT
 from support.study_tables import cheap_study, rows_of, write_record
 
 import msfp_gen
@@ -167,19 +168,19 @@ def test_no_scheduler_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.skipif(LAUNCHER is None, reason="needs an MPI library and its mpiexec")
 def test_rows_of_mpi_are_those_of_threads(tmp_path: Path) -> None:
+    """The program of examples/libraries."""
     pytest.importorskip("mpi4py")
     file, out, whole = tmp_path / "study.toml", tmp_path / "out", tmp_path / "whole"
     file.write_text(dumps(cheap_study()), encoding="utf-8")
-    command = [str(LAUNCHER), "-n", "3", sys.executable, "-m", "mpi4py.futures", "-m", "msfp_gen"]
-    command += ["study", str(file), "-o", str(out), "--mpi"]
+    program = ROOT / "examples" / "libraries" / "mpi.py"
+    command = [str(LAUNCHER), "-n", "3", sys.executable, "-m", "mpi4py.futures", str(program), str(file), str(out)]
     run = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
-    assert run.returncode == 0 and "12 of 12 runs" in run.stdout, run.stderr
+    assert run.returncode == 0, run.stderr
     msfp_gen.study(file, whole, threads=True)
     pd.testing.assert_frame_equal(rows_of(out), rows_of(whole))
 
 
-def test_one_process_or_no_library_is_one_line(tmp_path: Path) -> None:
-    pytest.importorskip("mpi4py")
-    with pytest.raises(InputError, match=r"--mpi: (this is one process; start it as mpiexec|.*install an MPI library)"):
-        msfp_gen.study(cheap_study(), tmp_path / "out", mpi=True)
-    assert not (tmp_path / "out").exists()
+def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("msfp_gen.studies.batch.find_spec", lambda _: None)
+    with pytest.raises(InputError, match=r"--dask needs distributed; pip install 'msfp-gen\[dask\]'"):
+        msfp_gen.study(many(), tmp_path / "out", dask="tcp://127.0.0.1:9")
