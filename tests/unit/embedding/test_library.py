@@ -357,7 +357,7 @@ def test_an_argument_that_fortran_leaves_out_is_null(prefix: Path, tmp_path: Pat
     environment = {"PKG_CONFIG_PATH": str(prefix / "lib" / "pkgconfig")}
     library = run(["pkg-config", "--libs", "msfp"], tmp_path, **environment).split()
     module = str(prefix / "share/msfp/msfp.f90")
-    flags = "-std=f2018 -Wall -Werror -pedantic -fcheck=all".split()
+    flags = ["-std=f2018", "-Wall", "-Werror", "-pedantic", "-fcheck=all"]
     command = ["gfortran", *flags, module, "left_out.f90", *library, f"-Wl,-rpath,{prefix / 'lib'}", "-o", "left_out"]
     run(command, tmp_path)
     refused, method = run(["./left_out"], tmp_path).splitlines()
