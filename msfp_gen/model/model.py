@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from time import perf_counter
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -149,6 +150,7 @@ ZERO: Triple = (0.0, 0.0, 0.0)
 
 _models: dict[ModelSpec, Model] = {}
 _models_lock = threading.Lock()
+_build_seconds = 0.0  # wall time that this process has spent on builds of models
 
 
 class Model:
@@ -430,7 +432,15 @@ def build_model(
     spec = ModelSpec(layout, Effects() if effects is None else effects, gradients)
     if (model := _models.get(spec)) is not None:  # read without the lock, which another thread may hold during a build
         return model
+    global _build_seconds
     with _models_lock:
         if spec not in _models:
+            begin = perf_counter()
             _models[spec] = Model(spec, *load(spec, progress))
+            _build_seconds += perf_counter() - begin
         return _models[spec]
+
+
+def working_time() -> float:
+    """A clock [s] without the time in which this process built models, for limits of the wall time of runs."""
+    return perf_counter() - _build_seconds

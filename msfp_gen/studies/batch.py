@@ -10,7 +10,6 @@ import multiprocessing
 import os
 import signal
 import threading
-import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -30,7 +29,7 @@ from typing import Any, Protocol, TypeVar
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.errors import InputError, MsfpError, RunError
-from msfp_gen.model.model import build_model
+from msfp_gen.model.model import build_model, working_time
 from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import System
@@ -349,17 +348,18 @@ def run_to_end(
 ) -> Any:
     """Run one scene of a batch or a study; a run that fails after its first row returns its result too.
 
-    progress, options: of `simulate`. seconds: longest wall time of the run [s]; None: no limit. Raises InputError as
-    `simulate`; RunError: there are no rows, or the time is over (status "limit"; `.result` has the rows until then).
+    progress, options: of `simulate`. seconds: longest wall time of the run, without builds [s]; None: no limit. Raises
+    InputError as `simulate`; RunError: there are no rows, or the time is over (status "limit"; `.result` has the rows
+    until then).
     """
     if scene.fidelity == "backbone":
         return run_backbone(scene)
-    begin, expired = time.perf_counter(), False
+    begin, expired = working_time(), False
 
     def proceed(reached: float, end: float) -> None:
         nonlocal expired
         progress(reached, end)
-        if seconds is not None and time.perf_counter() - begin > seconds and reached < end:
+        if seconds is not None and working_time() - begin > seconds and reached < end:
             expired = True
             raise _OutOfTime
 

@@ -1,21 +1,22 @@
 """Run a scene to a requested error: search the cheapest tolerance that meets the error on this scene.
 
 A reference run by a method of other stages, at a tenth of the tolerance, estimates the error. Its steps are at most
-half the mean step, and resolve the ringing of stuck sliders where affordable. SAFETY covers the error of the reference
-run; docs/accuracy.md compares such estimates with true errors. Half of the requested error is for effect selection,
-half for the method.
+half the mean step. Where nothing damps the ringing of stuck sliders, its tolerance is so small that it resolves what
+the other runs filter. Where this ringing exceeds the target, or there is no time for such a run, no error is stated,
+but what the ringing changes in this scene is. SAFETY covers the error of the reference run; docs/accuracy.md compares
+such estimates with true errors. Half of the requested error is for effect selection, half for the method.
 """
 
 from __future__ import annotations
 
-import time
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.tables import Table
-from msfp_gen.model.model import build_model
+from msfp_gen.model.model import build_model, working_time
 from msfp_gen.scene.effect_selection import slider_period
 from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.simulation.outcome import Progress
@@ -28,13 +29,14 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
 
-AFTER_IMPACTS = ", and after impacts,"
 CANDIDATE_TOLERANCES = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21))  # 1e-2, 3e-3, 1e-3 ... 1e-10
 REFERENCE_OFFSET = 2  # candidates from a tolerance to the tolerance of its reference run: a factor of ten
-STEPS_PER_PERIOD = 40  # of a reference run that resolves a ringing slider
-MOST_STEPS = 200_000  # of a reference run that resolves ringing: some seconds; beyond, ringing is stated as left out
+STEPS_PER_PERIOD = 40  # of a reference run in the period of a damped slider
+MOST_STEPS = 200_000  # of such a run: some seconds; longer runs do without
+RESOLVING = 1e-7  # tolerance of a reference run that resolves undamped ringing
+RESOLVING_SHARE = 0.5  # of the time left, which that run may take
 SAFETY = 1.5  # factor on the difference from the reference run, which has an error of its own
-DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays, so that it is not mentioned
+DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays
 STAGNATION_RATIO = 0.7  # ratio of errors over two candidates above which the tolerance is not their cause
 BUDGET = 120.0  # wall time of the whole search [s]
 METHOD: Final = "implicit"
@@ -102,7 +104,8 @@ class Within:
             was left.
         attempts: at all candidate tolerances that were tried, loosest first.
         seconds: wall time of search and run [s].
-        left_out: errors that the estimate does not include, as text; "" if none.
+        left_out: undamped ringing that the estimate does not include, and what it changes in this scene, as text; ""
+            if none.
         reasons: for the settings, as text.
         explained: whether `tables` lists attempts and reasons.
     """
@@ -119,8 +122,8 @@ class Within:
 
     @property
     def estimate(self) -> float | None:
-        """Estimated error of `result` [-]; None where undamped ringing after impacts leaves it unknown."""
-        return None if AFTER_IMPACTS in self.left_out else self.chosen.estimate
+        """Estimated error of `result` [-]; None where it is not known because undamped ringing exceeds it."""
+        return None if self.left_out else self.chosen.estimate
 
     @property
     def tables(self) -> list[Table]:
@@ -207,8 +210,8 @@ def simulate_within(
     effects, effect_reasons = effects_for(scene, error)
     scene = replace(scene, effects=effects)
     for candidate in (scene, with_all_effects(scene)):
-        build_model(candidate.bearing.layout, candidate.modelled)  # once, and not within the budget
-    begin = time.perf_counter()
+        build_model(candidate.bearing.layout, candidate.modelled)
+    begin = working_time()
     search = _Search(scene, error, begin + budget)
     try:
         index = search.loosest()
@@ -231,8 +234,8 @@ def simulate_within(
             replace(attempt, seconds=seconds_per_iteration * attempt.newton)
             for attempt in map(search.attempt, sorted(search.trials))
         ),
-        seconds=time.perf_counter() - begin,
-        left_out=search.left_out(result),
+        seconds=working_time() - begin,
+        left_out=search.left_out(index),
         reasons=reasons,
         explained=explain,
     )
@@ -257,9 +260,11 @@ class _Search:
         self.trials: dict[int, Trial] = {}
         self.references: dict[int, Trial] = {}  # index of a run -> its reference run
         self.reference_scene = with_all_effects(scene)
-        self.rings = self.reference_scene.modelled.sliders == "inertial"
-        self.period = slider_period(self.reference_scene) if self.rings else float("inf")
-        self.resolves_ringing = STEPS_PER_PERIOD * scene.end <= MOST_STEPS * self.period
+        inertial = self.reference_scene.modelled.sliders == "inertial"
+        self.period = slider_period(self.reference_scene) if inertial else float("inf")
+        damping = min(surface.contact_damping for surface in self.reference_scene.bearing.surfaces)
+        self.rings = inertial and pi * damping / self.period <= DAMPED
+        self.filtered = False  # whether the reference runs filter undamped ringing, which no estimate then includes
 
     def solver(self, index: int) -> Solver:
         """Solver options at a candidate tolerance."""
@@ -274,18 +279,36 @@ class _Search:
     def reference(self, index: int) -> Trial:
         """The reference run of the run at a candidate tolerance. Raises RunError as `trial`."""
         if index not in self.references:
-            steps = [self.reference_scene.end / (2 * max(self.trial(index).steps, 1))]
-            steps += [self.period / STEPS_PER_PERIOD] if self.rings and self.resolves_ringing else []
-            steps += [step for step in (self.reference_scene.solver.max_step,) if step is not None]
-            solver = replace(self.reference_scene.solver, max_step=min(steps), first_step=None)
-            scene = replace(self.reference_scene, solver=solver)
             tolerance = CANDIDATE_TOLERANCES[index + REFERENCE_OFFSET]
-            self.references[index] = self._run(REFERENCE_METHOD, scene, tolerance)
+            self.filtered = self.filtered or (self.rings and not self.resolved.finished)
+            self.references[index] = (
+                self.resolved
+                if self.rings and not self.filtered and tolerance >= RESOLVING
+                else self._run(REFERENCE_METHOD, self._with_short_steps(index), tolerance)
+            )
         return self.references[index]
 
+    def _with_short_steps(self, index: int) -> Scene:
+        """The reference scene with steps of at most half the mean step of a run, and several in a slider's period."""
+        scene, steps = self.reference_scene, [self.reference_scene.end / (2 * max(self.trial(index).steps, 1))]
+        if not self.filtered and STEPS_PER_PERIOD * scene.end <= MOST_STEPS * self.period:
+            steps.append(self.period / STEPS_PER_PERIOD)
+        steps += [step for step in (scene.solver.max_step,) if step is not None]
+        return replace(scene, solver=replace(scene.solver, max_step=min(steps), first_step=None))
+
+    @cached_property
+    def resolved(self) -> Trial:
+        """The run that resolves undamped ringing, as far as it came in its share of the time."""
+        return run_native(
+            REFERENCE_METHOD, self.reference_scene, RESOLVING, RESOLVING_SHARE * self._remaining, repeats=0
+        )
+
+    @property
+    def _remaining(self) -> float:
+        return max(self.deadline - working_time(), 0.05)
+
     def _run(self, method: str, scene: Scene, tolerance: float) -> Trial:
-        remaining = self.deadline - time.perf_counter()
-        trial = run_native(method, scene, tolerance, max(remaining, 0.05), repeats=0)
+        trial = run_native(method, scene, tolerance, self._remaining, repeats=0)
         if trial.status == CUT_OFF:
             raise RunError(self._target_missed(), status="accuracy")
         return trial
@@ -307,6 +330,9 @@ class _Search:
             estimate = self.attempt(index).estimate
             if estimate is not None and estimate <= self.target:
                 return index
+            if self.rings and not self.filtered and self._stagnates(index, first):
+                self.filtered, self.references = True, {}
+                return self.loosest()
             self._check_model_error(index, first, trial)
             if sum(not reference.finished for reference in self.references.values()) > REFERENCE_OFFSET:
                 break
@@ -321,11 +347,17 @@ class _Search:
             return
         if not trial.finished:
             raise _ModelErrorTooLargeError(f"a run with them ends early: {trial.message}")
+        if self._stagnates(index, first):
+            raise _ModelErrorTooLargeError(
+                f"they leave an error of {self.attempt(index).estimate:.2g} at any tolerance"
+            )
+
+    def _stagnates(self, index: int, first: int) -> bool:
+        """Whether the last two tighter tolerances did not reduce the error."""
         known = [self.attempt(k).estimate for k in range(max(first, index - REFERENCE_OFFSET), index + 1)]
         if len(known) <= REFERENCE_OFFSET or None in known:
-            return
-        if (known[-1] or 0.0) > STAGNATION_RATIO * (known[0] or 0.0):
-            raise _ModelErrorTooLargeError(f"they leave an error of {known[-1]:.2g} at any tolerance")
+            return False
+        return (known[-1] or 0.0) > STAGNATION_RATIO * (known[0] or 0.0)
 
     def cheapest(self, index: int) -> int:
         """`index`, or a tighter tolerance that takes no more iterations, since fewer of its steps are rejected."""
@@ -343,7 +375,8 @@ class _Search:
             differences = errors(trial, reference)
         if differences is not None:
             # The reference run of the looser neighbour has a third of the tolerance: more of its own error counts.
-            factor = SAFETY if index in self.references else 2 * SAFETY
+            close = index not in self.references and reference is not None and reference.rtol > 0.2 * trial.rtol
+            factor = 2 * SAFETY if close else SAFETY
             estimate = factor * largest_error(differences)
         return Attempt(trial.method, trial.rtol, trial.seconds, trial.newton, estimate, differences, trial.status)
 
@@ -360,7 +393,7 @@ class _Search:
         looser = [k for k in sorted(self.trials) if k < index and self.attempt(k).estimate is not None]
         method = (
             f"{METHOD}: L-stable, so that stuck sliders, which ring at hundreds to thousands of hertz, do not "
-            "limit its steps; that ringing is filtered, not resolved, and then esdirk4, of order 4, takes more "
+            "limit its steps; where that ringing is filtered, not resolved, esdirk4, of order 4, takes more "
             "Newton iterations for the same error (docs/accuracy.md)"
         )
         reference = self.references[next(k for k in (index, index - 1) if k in self.references)]
@@ -368,6 +401,8 @@ class _Search:
         text = f"the run at rtol {CANDIDATE_TOLERANCES[index]:g} was compared with {compared}"
         if self.reference_scene is not self.scene:
             text += " with every effect"
+        if self.rings and not self.filtered:
+            text += f", which resolves {self._ringing}"
         if looser and (self.attempt(looser[-1]).estimate or 0.0) <= self.target:
             return method, f"{text}; looser tolerances meet the target too, but lose more iterations to rejected steps"
         if not looser:
@@ -375,17 +410,25 @@ class _Search:
         last = self.attempt(looser[-1])
         return method, f"{text}; the next looser tolerance, {last.rtol:g}, has an error of about {last.estimate:.2g}"
 
-    def left_out(self, result: Result) -> str:
-        """Errors that no estimate of the search includes, as text; "" if none."""
-        damping = min(surface.contact_damping for surface in self.reference_scene.bearing.surfaces)
-        if not self.rings or self.resolves_ringing or pi * damping / self.period > DAMPED:
+    def left_out(self, index: int) -> str:
+        """Ringing that no estimate of the search includes, with its effect on this scene, as text; "" if none."""
+        if not self.filtered:
             return ""
-        impact = any(event.kind in ("rim_contact", "landing") for event in result.events)
-        return (
-            f"the ringing of stuck sliders{AFTER_IMPACTS if impact else ''} at {1 / self.period:.0f} Hz and above, "
-            "which has no damping and is filtered: resolved on purpose it moved the force of other scenes by up to 1 % "
-            "(docs/accuracy.md); give contact_damping"
+        resolved, found = self.resolved, errors(self.trial(index), self.resolved)
+        words = (
+            "a run that resolves it" if resolved.finished else f"until {resolved.reached:.3g} s a run that resolves it"
         )
+        effect = (
+            f"{words} differs by {share(found.force_rms)} RMS in force, {share(found.sliding_rms)} in sliding"
+            if found
+            else "no run resolved it"
+        )
+        remedy = "give contact_damping" + ("" if resolved.finished else " or a larger budget")
+        return f"{self._ringing}, which nothing damps: {effect}; {remedy}"
+
+    @property
+    def _ringing(self) -> str:
+        return f"the ringing of stuck sliders at {1 / self.period:.0f} Hz and above"
 
     def _target_missed(self) -> str:
         """Message that the target was not reached, with the best run so far."""
@@ -396,6 +439,8 @@ class _Search:
         so_far = f"a run with every effect fails: {failed[-1]}" if failed else "no error was estimated until then"
         if best is not None:
             so_far = f"the best is rtol = {best.rtol:g}, an error of about {best.estimate:.2g} in {best.seconds:.2g} s"
+        if self.rings and not self.filtered:
+            so_far += f", with {self._ringing}, which nothing damps: give contact_damping"
         return (
             f"an error of {self.target:g} was not reached{'' if failed else ' in the time given'}: {so_far}; "
             "give a larger error, a larger budget, or a tolerance (rtol) to run without an estimate"
