@@ -285,6 +285,9 @@ class BuildingResult(AnyResult):
         """Tables of the floors, storeys and bearings."""
         return summaries.tables(self.summary)
 
+    def over_steps(self, word: str, field: str) -> None:
+        """Nothing: studies take extremes of columns over the rows of a building."""
+
     @property
     def figures(self) -> Mapping[str, Any]:
         """The figures of the run by their names, as of `figures.figures_of`."""

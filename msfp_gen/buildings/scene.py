@@ -20,6 +20,8 @@ from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_ty
 from msfp_gen.common.identity import NO_NUMBERS
 from msfp_gen.common.tables import Table
 from msfp_gen.motions.motion import Motion
+from msfp_gen.results.quantities import Source
+from msfp_gen.results.variables import Places
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
 from msfp_gen.scene.friction_parameters import select_friction
@@ -303,6 +305,18 @@ class BuildingScene:
         from msfp_gen.buildings.figures import FIGURES
 
         return FIGURES
+
+    def quantities(self) -> dict[str, Source]:
+        """What tables report of a run, as of `results.quantities.quantities`."""
+        from msfp_gen.buildings.quantities import quantities
+
+        return quantities(self)
+
+    def columns(self) -> Places:
+        """The columns of a table of all rows, as of `results.dataset.columns`."""
+        from msfp_gen.buildings.dataset import columns
+
+        return columns(self)
 
     def at_fidelity(self, word: str) -> Any:
         """The scene at a level of fidelity, as of `scene.fidelity.at_fidelity`."""

@@ -116,7 +116,7 @@ def _run(chosen: Sequence[Variation], workers: int | None, folder: Path | None, 
 @contextmanager
 def _reported(rows: list[Row], count: int, table: Path | None, as_json: bool) -> Iterator[None]:
     """Print and write the rows at the end of the block, also where it is interrupted or fails."""
-    from msfp_gen.studies.columns import value_at
+    from msfp_gen.results.quantities import value_at
     from msfp_gen.studies.sweep import sweep_table, write_table
 
     try:

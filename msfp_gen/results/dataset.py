@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import MISSING, asdict, fields
-from functools import lru_cache
+from functools import lru_cache, singledispatch
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -111,8 +111,15 @@ def _columns(surfaces: int) -> Places:
     return column_places(ROWS, labels_of(surfaces))
 
 
-def columns(scene: Scene) -> Places:
+@singledispatch
+def columns(system: Any) -> Places:
     """The columns of a table of all rows, as of `column_places`; a run has those of its effects."""
+    places: Places = system.columns()
+    return places
+
+
+@columns.register(Scene)
+def _columns_of_scene(scene: Scene) -> Places:
     return _columns(scene.bearing.layout.surfaces)
 
 

@@ -137,6 +137,21 @@ class BearingData(ResultFiles):
             """Extremes over all steps."""
 
 
+# (word of an extreme, field of the history) -> field of `Extremes`, the same over all steps of a run.
+OVER_STEPS = {
+    ("peak", "displacement"): "displacement",
+    ("peak", "top_force"): "top_force",
+    ("peak", "sliding"): "sliding",
+    ("most", "sliding"): "sliding",
+    ("least", "gap"): "gap",
+    ("least", "normal_force"): "least_normal",
+    ("most", "normal_force"): "most_normal",
+    ("least", "friction_coefficient"): "least_friction",
+    ("most", "friction_coefficient"): "most_friction",
+    ("most", "temperature"): "temperature",
+}
+
+
 @dataclass(frozen=True, eq=False)
 class RunData(BearingData):
     """The fields of `msfp_gen.Result`, which adds dataset and summary.
@@ -194,6 +209,14 @@ class RunData(BearingData):
         """Extremes over all accepted steps and rows."""
         rows = Extremes.of_rows(self.history)
         return rows if self.recorded_extremes is None else rows | self.recorded_extremes
+
+    def over_steps(self, word: str, field: str) -> Array | None:
+        """An extreme of a field of the history over all steps; None where the run records none.
+
+        word: "peak", "least" or "most".
+        """
+        name = OVER_STEPS.get((word, field))
+        return None if name is None else getattr(self.extremes, name)
 
     @property
     def friction_coefficient(self) -> Array:

@@ -116,7 +116,7 @@ def summarise(result: RunData) -> dict[str, Any]:
             [m], [N]. These and the other extremes are over all accepted steps, whatever the times of the rows.
         axial_load: constant axial load [N]; None without one.
         peak_force_ratio: peak radial force over axial load [-]; None without a constant load.
-        peak_sliding, minimum_gap: [m].
+        peak_sliding, minimum_gap: [m]. capacity_used: sliding over capacity, 1 where a slider meets its rim [-].
         minimum_normal_force, maximum_normal_force: [N].
         friction: coefficients at the surfaces. friction_at_pivot: the same as data sheets give them
             (`Bearing.friction_at_pivot`); None where there are none [-].
@@ -179,6 +179,7 @@ def summary_of_bearing(one: BearingData) -> dict[str, Any]:
         "axial_load": load,
         "peak_force_ratio": force["radial"] / load if load else None,
         **{key: values.tolist() for key, values in recorded.items() if values is not None},
+        "capacity_used": (1.0 - extremes.gap / one.bearing.arrays()["capacity"]).tolist(),
         "peak_rim_force": None if extremes.rim_force is None else extremes.rim_force.tolist(),
         "friction": [surface.friction for surface in one.bearing.surfaces],
         "friction_at_pivot": None if sheet is None else list(sheet),

@@ -16,14 +16,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from msfp_gen.buildings import dataset as building_dataset
-from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Choice, Quantity, check_fields, ruled_fields
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Files, expecting, is_input, recording
-from msfp_gen.results import dataset
+from msfp_gen.results.dataset import columns as columns_of_system
+from msfp_gen.results.quantities import Source, quantities
 from msfp_gen.scene.file.catalogue import check_whole_numbers, known_keys, parsed
 from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.scene.file.loader import Suite, load_suite, scene_table, suite_from_table, toml_file
@@ -42,7 +41,7 @@ from msfp_gen.studies.axes import (
 )
 from msfp_gen.studies.batch import check_method
 from msfp_gen.studies.bounding.factors import load_factors
-from msfp_gen.studies.columns import Counts, Keep
+from msfp_gen.studies.columns import Keep, usual_names
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
@@ -71,11 +70,6 @@ KEYS = {
     "chunk": "a number of runs",
     "about": "written by msfp-gen",
 }
-DEFAULT_KEEP = ("peak_displacement", "peak_force", "peak_sliding", "rims_met", "limits_exceeded")
-BUILDING_KEEP = (
-    "peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "minimum_load_ratio",
-    "limits_exceeded",
-)  # fmt: skip
 _CHUNK = Quantity("", least=1, whole=True)
 
 
@@ -228,7 +222,7 @@ class Study:
 
 
 def check_study(study: Study) -> Study:
-    """Check a study; returns it with the counts of its quantities and the files that its scenes open.
+    """Check a study; returns it with its quantities and the files that its scenes open.
 
     Values of each axis are tried in the base scene: all texts and tables, and of numbers many, with the least and the
     largest of a random axis. Raises InputError: a value that a scene does not accept, a name that occurs twice, or too
@@ -244,7 +238,7 @@ def check_study(study: Study) -> Study:
         for axis in study.axes:
             with prefixed(f"axes.{axis.name}."):
                 _check_axis(axis, factory, bool(study.recipe.records))
-        counts = Counts()
+        sources: dict[str, Source] = {}
         columns: dict[str, None] = {}
         first, base, opened = {}, "", {}
         for place, scene, files in _tried_scenes(study, factory):  # one scene in memory at a time: motions are long
@@ -252,11 +246,11 @@ def check_study(study: Study) -> Study:
                 first, base = files, fingerprint((scene, sorted(files.values())))
             elif additional := sorted(digest for path, digest in files.items() if path not in first):
                 opened[place] = fingerprint(additional)
-            counts = counts.or_more(Counts.of(scene))
+            sources = quantities(scene) | sources
             if study.keep.formulas:
-                history = building_dataset if isinstance(scene, BuildingScene) else dataset
-                columns |= dict.fromkeys(history.columns(scene))
-        keep = replace(study.keep, counts=counts, history=tuple(columns))
+                columns |= dict.fromkeys(columns_of_system(scene))
+        kept = study.keep.names if "keep" in study.table else usual_names(sources)
+        keep = replace(study.keep, names=kept, sources=tuple(sources.items()), history=tuple(columns))
         study = replace(study, keep=keep, files=read, base=base, opened=opened)
     reserved = [INTENSITY] if study.recipe.intensities else []
     names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in study.keep.columns)]
@@ -427,7 +421,7 @@ def _checked_study(table: Mapping[str, Any], folder: Path | None, progress: Prog
     for name, text in formulas:
         if not isinstance(text, str):
             raise InputError(f"quantities.{name} = {text!r}: give a formula in quotes, such as 'peak_sliding_1 / 0.13'")
-    names = table.get("keep", BUILDING_KEEP if "building" in scene else DEFAULT_KEEP)
+    names = table.get("keep", ())
     if not isinstance(names, list | tuple) or not all(isinstance(item, str) for item in names):
         raise InputError(f"keep = {names!r}: give {KEYS['keep']} in quotes")
     keep = Keep(

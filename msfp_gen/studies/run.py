@@ -276,7 +276,7 @@ class Chunks:
             "base": study.base,
             "factors": study.recipe.factors,
             "axes": [(axis.name, axis.change, axis.paths, axis.surfaces, axis.random) for axis in study.axes],
-            "keep": [study.keep.names, study.keep.formulas, study.keep.counts.surfaces],
+            "keep": [study.keep.names, study.keep.formulas, sorted(study.keep.known)],
             "intensity": study.table.get("records", {}).get("intensity"),
             "run_seconds": study.limits.run_seconds,
         }

@@ -13,15 +13,15 @@ from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.errors import InputError, RunError, prefixed
 from msfp_gen.common.tables import Table, write_columns
+from msfp_gen.results.quantities import Source, quantities, value_at
 from msfp_gen.scene.file.changes import keys_of
 from msfp_gen.scene.file.loader import scene_table
 from msfp_gen.scene.file.source import with_absolute_paths
 from msfp_gen.scene.system import System
 from msfp_gen.studies.axes import Axis, Recipe, SceneFactory, located, motion_of
-from msfp_gen.studies.columns import Counts, catalogue, plain_cell, value_at
+from msfp_gen.studies.columns import plain_cell
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult
@@ -117,8 +117,7 @@ def row_of(number: int, variation: Variation, result: Result | BuildingResult | 
     if not isinstance(result, RunError):
         return Row(number, variation, result.summary, "" if file is None else file.name)
     summary = {"status": result.status, "message": str(result), "name": variation.scene.name}
-    of_building = isinstance(variation.scene, BuildingScene)
-    return Row(number, variation, {**summary, "bearings": []} if of_building else summary, "")
+    return Row(number, variation, summary, "")
 
 
 def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> Path:
@@ -133,12 +132,9 @@ def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> 
         ("scene", ""): [row.variation.source for row in rows],
         **{(path, ""): [plain_cell(row.variation.varied.get(path)) for row in rows] for path in varied},
     }
-    counts: dict[bool, Counts] = {}
+    sources: dict[str, Source] = {}
     for row in rows:
-        of_scene = Counts.of(row.variation.scene)
-        is_building = of_scene.bearings > 0
-        counts[is_building] = counts.get(is_building, Counts()).or_more(of_scene)
-    sources = {name: source for _, count in sorted(counts.items()) for name, source in catalogue(count).items()}
+        sources = quantities(row.variation.scene) | sources
     for column, source in sources.items():
         if source.quantity.characterised:
             continue

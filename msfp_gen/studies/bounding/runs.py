@@ -34,6 +34,7 @@ from msfp_gen.figures.style import (
     subscript,
 )
 from msfp_gen.results.characterise import Characterisation
+from msfp_gen.results.quantities import Source, quantities
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.fidelity import check_stack
 from msfp_gen.scene.friction_parameters import proportional, select_friction
@@ -42,7 +43,6 @@ from msfp_gen.specification.friction_laws import Law, law_of
 from msfp_gen.specification.layout import Auto
 from msfp_gen.studies.batch import ENDED, completed_runs
 from msfp_gen.studies.bounding.factors import PROPERTIES, RULES, FactorTable
-from msfp_gen.studies.columns import Counts, Source, catalogue
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -126,8 +126,7 @@ class Bounds:
     @property
     def compared(self) -> dict[str, Source]:
         """Column -> quantity that the cases are compared by; properties of loops are means over the cycles."""
-        counts = Counts.of(self.cases[0].scene)
-        return {name: source for name, source in catalogue(counts).items() if source.compared}
+        return {name: source for name, source in quantities(self.cases[0].scene).items() if source.compared}
 
     def quantities(self) -> dict[str, dict[str, float | None]]:
         """Quantity -> case -> value [SI]; None where the run failed or the quantity is undefined."""

@@ -13,15 +13,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import RunError
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.figures.style import INK, distinct, headline, page, plain
+from msfp_gen.results.quantities import Source, quantities
 from msfp_gen.studies.bounding.factors import FactorTable
 from msfp_gen.studies.bounding.runs import CASES, Progress, bound, shown_as
-from msfp_gen.studies.columns import Counts, Source, catalogue
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -138,7 +137,7 @@ def bound_suite(
     `bound`.
     """
     first = next(iter(scenes.values()))
-    sources = _quantities(first)
+    sources = {name: source for name, source in quantities(first).items() if source.quantity.governs}
     values = {key: np.full((len(scenes), len(CASES)), np.nan) for key in sources}
     failures: dict[tuple[str, str], str] = {}
     undefined: dict[str, str] = {}
@@ -174,23 +173,6 @@ def bound_suite(
 def _progress_of(progress: Progress, row: int, count: int) -> Progress:
     """The progress of one record, by its index, as progress of a suite of `count` records."""
     return lambda done, whole: progress(row + done / whole, count)
-
-
-def _quantities(scene: System) -> dict[str, Source]:
-    """Column -> quantity of which a value governs, with the name of its part of the bearing or building."""
-    names: dict[str, list[str]] = {}
-    if isinstance(scene, BuildingScene):
-        names = {
-            "floors": [node.name for node in scene.building.nodes],
-            "storeys": [column.name for column in scene.building.columns],
-            "bearings": [bearing.name or f"bearing {number}" for number, bearing in enumerate(scene.bearings, 1)],
-        }
-    sources = {name: source for name, source in catalogue(Counts.of(scene)).items() if source.quantity.governs}
-    for name, source in sources.items():
-        if source.place is not None:
-            labels = names.get(source.quantity.path.partition(".*")[0])
-            sources[name] = source._replace(part=labels[source.place] if labels else f"surface {source.place + 1}")
-    return sources
 
 
 def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:

@@ -93,7 +93,8 @@ def run_backbone(scene: Any) -> BackboneRun:
         sliding = _backbone(bearings[0], mass * gravity).sliding(peak)
         gaps_left = [surface.capacity - value for surface, value in zip(scene.bearing.surfaces, sliding, strict=True)]
         rims_met = [number for number, gap in enumerate(gaps_left, start=1) if gap <= 1e-9]
-        summary |= {"peak_sliding": sliding, "minimum_gap": gaps_left, "rims_met": rims_met}
+        used = [1 - gap / surface.capacity for gap, surface in zip(gaps_left, scene.bearing.surfaces, strict=True)]
+        summary |= {"peak_sliding": sliding, "minimum_gap": gaps_left, "capacity_used": used, "rims_met": rims_met}
     return BackboneRun(scene, summary["status"], "", summary)
 
 

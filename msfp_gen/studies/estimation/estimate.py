@@ -238,7 +238,7 @@ def estimate(
         study, quantity=quantity, statistic=statistic, threshold=threshold, target=target, budget=budget,
         models=None if models is None else tuple(models), pilot=pilot, seed=seed,
     )  # fmt: skip
-    cheaper = ("backbone", "rigid" if study.keep.counts.bearings else "massless")
+    cheaper = ("backbone", "massless" if "peak_sliding_1" in study.keep.known else "rigid")
     levels = (EXACT, *(cheaper if question.models is None else question.models))
     assert question.quantity is not None
     scales, unit = _scales(study, question)

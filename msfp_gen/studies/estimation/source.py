@@ -243,8 +243,7 @@ def check_quantity(study: Study, quantity: str, levels: Sequence[str]) -> None:
         if level == "backbone":
             check_backbone(factory.base)
             known = {*QUANTITIES, *study.keep.axes}
-            if not study.keep.counts.bearings:
-                known |= {f"{name}_{k + 1}" for name in OF_SURFACES for k in range(study.keep.counts.surfaces)}
+            known |= {name for name in study.keep.known if name.rpartition("_")[0] in OF_SURFACES}
             if missing := [name for name in _names_in(study.keep, quantity) if name not in known]:
                 raise InputError(
                     f"quantity = {quantity!r}: {missing[0]} is none of the model 'backbone'; give another quantity, or "

@@ -22,9 +22,9 @@ from msfp_gen.results.files import table_of
 from msfp_gen.results.joining import at_times
 from msfp_gen.results.loops import ForcePath as Motions
 from msfp_gen.results.note import Note
+from msfp_gen.results.quantities import quantities
 from msfp_gen.results.summary import summary_of_bearing
 from msfp_gen.scene.fidelity import at_fidelity
-from msfp_gen.studies.columns import Counts, catalogue
 
 
 def test_the_note_of_a_cheaper_model_is_read_from_the_file(tmp_path: Path):
@@ -313,7 +313,7 @@ def test_every_quantity_of_the_catalogue_is_in_a_pushed():
     cycles = preset_run("fenz-test2").characterise().envelope
     for run in (preset_run("fenz-test2"), pushed()):
         characterisation = replace(run.characterise(), envelope=cycles)  # the building moves for less than a cycle
-        sources = catalogue(Counts.of(run.scene))
+        sources = quantities(run.scene)
         values = {name: source.value(run.summary, characterisation) for name, source in sources.items()}
         missing = {name.rstrip("_1234") for name, value in values.items() if value is None}
         # no friction law, no uplift; and both runs end in motion

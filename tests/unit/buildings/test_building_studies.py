@@ -216,7 +216,7 @@ def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.Cap
     [
         (["run", "--error", "1%"], "--error = 0.01: this is a building"),
         (["animate", "-o", "x.gif", "--end", "9"], "time = 9 s: the run holds 0 to 0.24 s"),
-        (["fit", "test.csv", "--parameters", "bearing.friction"], "this is a building"),
+        (["fit", "test.csv", "--parameters", "bearing.friction"], "give a scene of one bearing here"),
         (["plot", "--figure", "loops"], "--figure = 'loops': give one of overview, plan"),
         (["export", "-o", "x.csv", "--sign", "top-base"], "columns of a building have one sign"),
     ],

@@ -1,0 +1,39 @@
+"""The quantities of the run of a building that tables, studies and bounds report."""
+
+from __future__ import annotations
+
+from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.results.quantities import RUN, Quantity, Source, sources_of
+
+_RUN = RUN | {"rims_met": RUN["rims_met"]._replace(kept=False)}
+QUANTITIES = _RUN | {
+    "peak_base_torsion": Quantity("N m", "peak_base_torsion"),
+    "peak_overturning_moment": Quantity("N m", "peak_overturning_moment.radial", "most"),
+    "peak_floor_acceleration": Quantity("m/s^2", "peak_floor_acceleration.radial", "most", kept=True),
+    "peak_vertical_acceleration": Quantity("m/s^2", "peak_floor_acceleration.E3"),
+    "peak_drift_ratio": Quantity("", "peak_drift_ratio", "most", kept=True),
+    "peak_corner_drift_ratio": Quantity("", "peak_corner_drift_ratio", "most"),
+    "minimum_load_ratio": Quantity("", "minimum_load_ratio", "least", kept=True),
+    "maximum_load_ratio": Quantity("", "maximum_load_ratio", "most"),
+    "floor_acceleration": Quantity("m/s^2", "floors.*.peak_acceleration.radial", "most", of_parts=True),
+    "storey_drift_ratio": Quantity("", "storeys.*.peak_drift_ratio", "most", of_parts=True),
+    "storey_corner_drift_ratio": Quantity("", "storeys.*.peak_corner_drift_ratio", "most", of_parts=True),
+    "storey_shear": Quantity("N", "storeys.*.peak_shear.radial", "most", of_parts=True),
+    "bearing_displacement": Quantity("m", "bearings.*.peak_displacement.radial", "most", of_parts=True),
+    "bearing_load_ratio": Quantity("", "bearings.*.minimum_load_ratio", "least", of_parts=True),
+    "bearing_maximum_load_ratio": Quantity("", "bearings.*.maximum_load_ratio", "most", of_parts=True),
+    "bearing_uplift_height": Quantity("m", "bearings.*.uplift.height", "most", of_parts=True),
+    "bearing_uplift_duration": Quantity("s", "bearings.*.uplift.duration", "most", of_parts=True),
+    "secant_period": Quantity("s", "secant_period", characterised=True),
+    "capacity_left": Quantity("m", "capacity_left", "least", characterised=True),
+}
+
+
+def quantities(scene: BuildingScene) -> dict[str, Source]:
+    """Column -> source of the quantities of a building, with the names of its floors, storeys and bearings."""
+    parts = {
+        "floors": [node.name for node in scene.building.nodes],
+        "storeys": [column.name for column in scene.building.columns],
+        "bearings": [bearing.name or f"bearing {number}" for number, bearing in enumerate(scene.bearings, 1)],
+    }
+    return sources_of(QUANTITIES, parts, 0)

@@ -1,0 +1,149 @@
+"""The quantities of a run that tables, studies and bounds report: names, units, and places in its summary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import singledispatch
+from typing import Any, Literal, NamedTuple
+
+from msfp_gen.scene.scene import Scene
+
+
+class Quantity(NamedTuple):
+    """A quantity of a run.
+
+    path: dotted path of the value in the summary, or in the characterisation if `characterised`; `.*` stands for each
+    surface, floor, storey or bearing, bottom first or in the order of the file, and gives one column for each. governs:
+    whether the largest or the least value governs a design; "" if neither does. at_rest: whether the quantity is
+    defined only if the run ends at rest. of_parts: whether it is of parts of a building, which suites compare and
+    bounds do not. kept: whether a study keeps it where its file names no quantities.
+    """
+
+    unit: str
+    path: str
+    governs: Literal["most", "least", ""] = ""
+    characterised: bool = False
+    at_rest: bool = False
+    of_parts: bool = False
+    kept: bool = False
+
+
+RUN = {
+    "status": Quantity("", "status"),
+    "message": Quantity("", "message"),
+    "duration": Quantity("s", "duration"),
+    "peak_displacement": Quantity("m", "peak_displacement.radial", "most", kept=True),
+    "peak_force": Quantity("N", "peak_force.radial", "most", kept=True),
+    "peak_force_ratio": Quantity("", "peak_force_ratio"),
+    "rims_met": Quantity("", "rims_met", kept=True),
+    "verdict": Quantity("", "verdict.word"),
+    "limits_exceeded": Quantity("", "verdict.limits", kept=True),
+    "closure_error": Quantity("", "energy.closure_error"),
+    "steps": Quantity("", "counters.steps"),
+    "wall_time": Quantity("s", "wall_time"),
+    "secant_stiffness": Quantity("N/m", "secant_stiffness", characterised=True),
+    "energy_dissipated": Quantity("J", "energy_dissipated", characterised=True),
+    "residual_displacement": Quantity("m", "residual_displacement", "most", characterised=True, at_rest=True),
+    # means over the cycles
+    "effective_stiffness": Quantity("N/m", "envelope.effective_stiffness.mean", characterised=True),
+    "effective_period": Quantity("s", "envelope.effective_period.mean", characterised=True),
+    "effective_damping": Quantity("", "envelope.effective_damping.mean", characterised=True),
+    "zero_displacement_force": Quantity("N", "envelope.zero_displacement_force.mean", characterised=True),
+}
+BEARING = RUN | {
+    "axial_load": Quantity("N", "axial_load"),
+    "peak_input_energy": Quantity("J", "energy.peak_input"),
+    "dissipated_share": Quantity("", "energy.dissipated_share"),
+    "capacity_used": Quantity("", "capacity_used.*"),  # 1 where a slider meets its rim
+    "peak_sliding": Quantity("m", "peak_sliding.*", kept=True),
+    "minimum_gap": Quantity("m", "minimum_gap.*"),
+    "minimum_normal_force": Quantity("N", "minimum_normal_force.*"),
+    "maximum_normal_force": Quantity("N", "maximum_normal_force.*"),
+    "least_friction": Quantity("", "least_friction.*"),
+    "most_friction": Quantity("", "most_friction.*"),
+    "peak_temperature": Quantity("degC", "peak_temperature.*"),
+    "peak_rim_force": Quantity("N", "peak_rim_force.*"),
+    "uplift_height": Quantity("m", "uplift.height"),
+    "uplift_duration": Quantity("s", "uplift.duration"),
+    "maximum_uplift": Quantity("m", "maximum_uplift", "most", characterised=True),
+    "capacity_left": Quantity("m", "surfaces.*.capacity_left", "least", characterised=True),
+    "peak_velocity": Quantity("m/s", "surfaces.*.peak_velocity", "most", characterised=True),
+    "peak_heat_flux": Quantity("W/m^2", "surfaces.*.peak_heat_flux", "most", characterised=True),
+}
+
+
+MOVING = "the run ends while the bearing still moves: give motion.hold, such as 20 s, for time without motion"
+
+
+class Source(NamedTuple):
+    """Where the value of a column comes from: a quantity of the run, or of one of its parts.
+
+    place: index from 0 of the surface, floor, storey or bearing; None: of the run. part: name of that part in messages.
+    """
+
+    quantity: Quantity
+    place: int | None = None
+    part: str = ""
+
+    def reason(self, characterisation: Any) -> str:
+        """Why a characterised run has no value of the quantity; "" where no reason is known."""
+        rests = getattr(characterisation, "at_rest", True)
+        return "" if rests or not self.quantity.at_rest else MOVING
+
+    @property
+    def compared(self) -> bool:
+        """Whether `bound` compares the quantity; quantities of parts of a building are compared in suites only."""
+        quantity = self.quantity
+        return not quantity.of_parts and (quantity.characterised or bool(quantity.governs))
+
+    def value(self, summary: Mapping[str, Any], characterisation: Any) -> Any:
+        """The value of the quantity; None where the run has none.
+
+        characterisation: of the run; None where it is not needed, or not possible.
+        """
+        quantity = self.quantity
+        if quantity.at_rest and not getattr(characterisation, "at_rest", False):
+            return None
+        value = value_at(characterisation if quantity.characterised else summary, quantity.path)
+        if self.place is None or value is None:
+            return value
+        return value[self.place] if self.place < len(value) else None
+
+
+@singledispatch
+def quantities(system: Any) -> dict[str, Source]:
+    """Column of a table -> where its value comes from in the result of a system."""
+    sources: dict[str, Source] = system.quantities()
+    return sources
+
+
+@quantities.register(Scene)
+def _quantities_of_bearing(scene: Scene) -> dict[str, Source]:
+    return sources_of(BEARING, {}, len(scene.bearing.surfaces))
+
+
+def sources_of(table: Mapping[str, Quantity], parts: Mapping[str, Sequence[str]], surfaces: int) -> dict[str, Source]:
+    """Column -> source of every quantity of a table; one for each part of a quantity of several.
+
+    parts: names of the floors, storeys or bearings. surfaces: number of surfaces, for all other quantities of several.
+    """
+    sources: dict[str, Source] = {}
+    for name, quantity in table.items():
+        head, several, _ = quantity.path.partition(".*")
+        if not several:
+            sources[name] = Source(quantity)
+            continue
+        labels = parts.get(head) or [f"surface {number}" for number in range(1, surfaces + 1)]
+        sources |= {f"{name}_{index + 1}": Source(quantity, index, label) for index, label in enumerate(labels)}
+    return sources
+
+
+def value_at(table: Any, path: str) -> Any:
+    """The value at a dotted path of keys or attributes, None where there is none; `*` gives a list over all rows."""
+    value = table
+    head, several, rest = path.partition(".*")
+    for part in head.split("."):
+        value = value.get(part) if isinstance(value, Mapping) else getattr(value, part, None)
+    if not several or value is None:
+        return value
+    return [value_at(row, rest.lstrip(".")) for row in value] if rest else value
