@@ -1,7 +1,7 @@
 """The generator: derives the equations of a layout with its effects and emits them as C.
 
-It reads and writes no files, runs no compiler and contains no values of a bearing. `generate` calls its stages in
-order: derive -> lower -> emit.
+It writes no files, reads none but its templates and the headers of the runtime, whose functions it declares and names,
+runs no compiler and contains no values of a bearing. `generate` calls its stages in order: derive -> lower -> emit.
 """
 
 from __future__ import annotations

@@ -41,10 +41,10 @@ def main() -> None:
     given = options.parse_args()
     zig = zig_program()
     if zig is None and QUICK:
-        print("left out, since ziglang is not installed (pip install 'msfp-gen[wheels]'): the wheel")
+        print("left out, since ziglang is not installed (pip install -e .[wheels]): the wheel")
         return
     if zig is None:
-        raise SystemExit("error: ziglang is not installed: pip install 'msfp-gen[wheels]'")
+        raise SystemExit("error: ziglang is not installed: pip install -e .[wheels]")
     with TemporaryDirectory() as folder, TemporaryDirectory() as built:
         output = Path(built) if QUICK else given.output
         output.mkdir(parents=True, exist_ok=True)

@@ -282,7 +282,9 @@ def digest_sources() -> str:
     for folder, pattern in SOURCES:
         files = sorted((PACKAGE / folder).rglob(pattern))
         if not files:
-            raise InputError(f"{PACKAGE / folder}: no {pattern} here: install msfp-gen again (pip install msfp-gen)")
+            raise InputError(
+                f"{PACKAGE / folder}: no {pattern} here: install msfp-gen again (pip install . in its checkout)"
+            )
         for path in files:
             data = path.read_bytes()
             total.update(f"{folder}/{path.relative_to(PACKAGE / folder).as_posix()}\0{len(data)}\0".encode())

@@ -141,7 +141,7 @@ def find_compiler() -> Compiler:
     tried = f"CC={chosen}" if chosen else ", ".join(dict.fromkeys(filter(None, candidates)))
     raise CompileError(
         f"no C compiler found (looked for {tried}): install one (apt install gcc, xcode-select --install, "
-        "conda install c-compiler, or pip install 'msfp-gen[compiler]') or name it with CC=..."
+        "conda install c-compiler, or pip install ziglang) or name it with CC=..."
     )
 
 

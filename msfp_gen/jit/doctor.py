@@ -74,9 +74,7 @@ def check_dependencies() -> list[Check]:
     try:
         declared = metadata.requires(DISTRIBUTION) or []
     except metadata.PackageNotFoundError:
-        return [
-            Check(DISTRIBUTION, False, "not installed", "pip install -e . in the checkout, or pip install msfp-gen")
-        ]
+        return [Check(DISTRIBUTION, False, "not installed", "pip install . in the checkout")]
     return [_check_requirement(line) for line in declared if "extra ==" not in line]
 
 

@@ -205,7 +205,7 @@ def find_tools(platform: Platform) -> tuple[Compiler, tuple[str, ...]]:
         return find_compiler(), _find_archiver()
     zig = zig_program()
     if zig is None:
-        raise CompileError("--target needs ziglang, a compiler for other platforms: pip install 'msfp-gen[compiler]'")
+        raise CompileError("--target needs ziglang, a compiler for other platforms: pip install ziglang")
     command = (str(zig), *ZIG_OPTIONS, "-target", platform.triple)
     return Compiler(command, str(zig), "zig"), (str(zig), "ar")
 

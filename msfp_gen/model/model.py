@@ -112,7 +112,7 @@ class Ode:
         return self.rates(t, y)[0]
 
     def rates(self, t: float, y: Array) -> tuple[Array, int]:
-        """The value of `fun`, ndarray, shape of y, and the number of Newton iterations."""
+        """The value of `fun`, ndarray, shape of y [SI], and the number of Newton iterations."""
         a, _, rates, iterations = self._accelerations(t, y)
         return np.concatenate([self._split(np.asarray(y))[1].ravel(), a.ravel(), rates.ravel()]), iterations
 
@@ -281,7 +281,7 @@ class Model:
         )
 
     def unknowns(self, a: Array, row: Array) -> Array:
-        """The unknowns of `residual`, ndarray, from accelerations and a row, of a planar model in its plane [SI]."""
+        """The unknowns as of `residual` [SI], from accelerations and a row, of a planar model in its plane."""
         fields = self.unpack(row)
         angles = fields["angles"][:, 1:] if self.planar else fields["angles"]
         return np.concatenate([a[:, free_coordinates(self.effects)].ravel(), angles.ravel(), fields["normal"]])

@@ -324,7 +324,7 @@ class Motion:
     def circle(
         cls, amplitude: float, angular_frequency: float, *, cycles: float = 2.0, lead_in: float = 20.0, name: str = ""
     ) -> Motion:
-        """Circular orbit A S cos(Omega t), A S sin(Omega t) of PEER 2017/07, section 4.4.
+        """Circular orbit A S cos(Omega t), A S sin(Omega t) of PEER 2017/07, section 4.3.
 
         Args:
             amplitude: A [m].
@@ -341,7 +341,7 @@ class Motion:
     def figure_eight(
         cls, amplitude: float, angular_frequency: float, *, cycles: float = 2.0, lead_in: float = 20.0, name: str = ""
     ) -> Motion:
-        """Figure-eight orbit A S cos(Omega t), A S sin(2 Omega t) of PEER 2017/07, section 4.4.
+        """Figure-eight orbit A S cos(Omega t), A S sin(2 Omega t) of PEER 2017/07, section 4.3.
 
         Args:
             amplitude: A [m].

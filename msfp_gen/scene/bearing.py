@@ -7,7 +7,7 @@ PEER 2017/07 follows in brackets.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from dataclasses import fields as dataclass_fields
 from dataclasses import replace as dataclass_replace
 from importlib import import_module
@@ -115,6 +115,8 @@ class Bearing:
 
     base_height: l_1 [m]. gravity: g [m/s^2]. base_rim_radius, base_rim_offset: r_1, p_1, used where the first surface
     is concave down [m]. base_centroid: z_1, which only defines the named point r_1 (3.2); None: half the height [m].
+    friction_at: "pivot" where the coefficients of `surfaces` are those of a data sheet; the bearing keeps those at the
+    surfaces (`friction_from_pivot`).
     Raises InputError: a wrong number of entries, a value out of range, or a geometry that cannot be built.
     """
 
@@ -126,8 +128,9 @@ class Bearing:
     base_rim_radius: Annotated[float, _BODY["rim_radius"]] = 0.0
     base_rim_offset: Annotated[float, _BODY["rim_offset"]] = 0.0
     base_centroid: Annotated[float | None, _BODY["centroid"]] = None
+    friction_at: InitVar[str] = "surface"
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, friction_at: str) -> None:
         require_type(self.layout, Layout, "bearing.layout")
         check_fields(self, "bearing")
         for name, kind in _LISTS.items():
@@ -137,6 +140,12 @@ class Bearing:
         _check_bounds(contract.BODY_BOUNDS, base, shown)
         for index in range(self.layout.surfaces):
             self._check_geometry(index)
+        if _is_at_pivot(friction_at):
+            radii, friction = zip(*((surface.radius, surface.friction) for surface in self.surfaces), strict=True)
+            heights = (self.base_height, *(body.height for body in self.bodies))
+            converted = friction_from_pivot(self.layout, radii, heights, friction)
+            rows = zip(self.surfaces, converted, strict=True)
+            object.__setattr__(self, "surfaces", tuple(dataclass_replace(row, friction=mu) for row, mu in rows))
 
     def _check_list(self, name: str, kind: type) -> None:
         items = getattr(self, name)
@@ -196,7 +205,9 @@ class Bearing:
         pivot of the bearing, and are converted: `friction_from_pivot`. Raises InputError: an unknown
         name, a list of the wrong length, or an invalid value.
         """
-        at_pivot = _is_at_pivot(changes.pop("friction_at", "surface"), "friction" in changes)
+        friction_at = changes.pop("friction_at", "surface")
+        if _is_at_pivot(friction_at) and not {"friction", "surfaces"} & changes.keys():
+            raise InputError("bearing.friction_at = 'pivot': no friction coefficients are given; give friction with it")
         list_of = {column: name for name, kind in _LISTS.items() for column in _names(kind)}
         own = {name: changes.pop(name) for name in _names(Bearing) if name in changes}
         base = dataclass_replace(self, **own)
@@ -210,12 +221,7 @@ class Bearing:
             for index, value in enumerate(values):
                 with errors_at(type(items[index]).__name__.lower(), f"bearing.{list_of[column]}[{index}]"):
                     items[index] = dataclass_replace(items[index], **{column: value})
-        changed = dataclass_replace(base, surfaces=rows["surfaces"], bodies=rows["bodies"])
-        if not at_pivot:
-            return changed
-        radii, friction = zip(*((surface.radius, surface.friction) for surface in changed.surfaces), strict=True)
-        heights = (changed.base_height, *(body.height for body in changed.bodies))
-        return changed.replace(friction=friction_from_pivot(changed.layout, radii, heights, friction))
+        return dataclass_replace(base, surfaces=rows["surfaces"], bodies=rows["bodies"], friction_at=friction_at)
 
     @property
     def friction_at_pivot(self) -> tuple[float, ...] | None:
@@ -269,12 +275,10 @@ def _names(kind: type) -> list[str]:
     return [field.name for field in dataclass_fields(kind)]
 
 
-def _is_at_pivot(word: Any, friction_given: bool) -> bool:
-    """Whether the coefficients refer to the pivot. Raises InputError for another word, or without coefficients."""
+def _is_at_pivot(word: Any) -> bool:
+    """Whether the coefficients refer to the pivot. Raises InputError for another word."""
     if word not in ("surface", "pivot"):
         raise InputError(f"bearing.friction_at = {word!r}: give 'surface' or 'pivot'")
-    if word == "pivot" and not friction_given:
-        raise InputError("bearing.friction_at = 'pivot': no friction coefficients are given; give friction with it")
     return bool(word == "pivot")
 
 

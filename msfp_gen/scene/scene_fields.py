@@ -69,7 +69,8 @@ class InitialState:
     """Initial state of a run, as nested tuples; arrays and lists are accepted too.
 
     q: angles psi, theta, phi of bodies 2..n, shape (n-1, 3) [rad]. v: their rates, same shape [rad/s].
-    h: friction state Y, Z of each surface, shape (n-1, 2) [-], within the unit disc (2.94). Raises InputError.
+    h: friction state Y, Z of each surface, shape (n-1, 2) [-], within the unit disc (2.94). The displacement across the
+    bearing counts from this state, its sliding and its gaps from the centre of each dish. Raises InputError.
     """
 
     q: Annotated[Triples, replace(_RUN["q"], shape=(None, 3))]
@@ -89,7 +90,8 @@ class InitialState:
 class Stop:
     """Conditions that end a run before its duration; the first that is met counts.
 
-    displacement: horizontal displacement across the bearing [m]. all_rims: every rim is in contact. Raises InputError.
+    displacement: horizontal displacement across the bearing, from its start [m]. all_rims: every rim is in contact.
+    Raises InputError.
     """
 
     displacement: Annotated[float | None, _RUN["stop_displacement"]] = None

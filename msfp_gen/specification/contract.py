@@ -29,12 +29,17 @@ NUMBERS = friction_laws.NUMBERS | friction_laws.SPIN_NUMBERS
 GRAVITY = Value("gravity", Quantity("m/s^2", least=0.0), "gravity")
 BODY = (  # of each body, the base first
     Value("height", _LENGTH, "height l"),
-    Value("centroid", _OFFSET, "distance z of the centre of mass from the bottom; not used for the base"),
+    Value(
+        "centroid",
+        _OFFSET,
+        "distance z of the centre of mass from the bottom of a body above a concave-up surface (3.6), from the top of "
+        "one above a concave-down surface (3.10); not used for the base",
+    ),
     Value("mass", Quantity("kg", above=0.0), "mass m; not used for the base", base=False),
     Value("inertia_transverse", _INERTIA, "moments of inertia lambda_1 = lambda_2; not used for the base", base=False),
     Value("inertia_axial", _INERTIA, "moment of inertia lambda_3; not used for the base", base=False),
     Value("rim_radius", _OFFSET, "radius r of the edge that meets a rim"),
-    Value("rim_offset", _OFFSET, "height p of that edge above the face"),
+    Value("rim_offset", _OFFSET, "distance p of that edge from the face on that surface, along the axis (3.25)"),
 )
 BODY_BOUNDS = (
     Bound("centroid", "height", "the height of the body"),

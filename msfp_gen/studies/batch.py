@@ -212,7 +212,7 @@ def local_pool(workers: int | None = None, processes: bool = False) -> Iterator[
 @contextmanager
 def dask_pool(address: str) -> Iterator[Pool]:
     """Workers of a Dask cluster. address: of its scheduler, or a scheduler file. Raises InputError, RunError."""
-    require("distributed", "dask", "--dask")
+    require("distributed", "--dask")
     from distributed import Client
 
     scheduler = {"scheduler_file": address} if address.endswith(".json") else {"address": address}
@@ -230,10 +230,10 @@ def dask_pool(address: str) -> Iterator[Pool]:
         client.close()
 
 
-def require(module: str, extra: str, what: str) -> None:
+def require(module: str, what: str) -> None:
     """Raise InputError with the remedy where an optional module is not installed."""
     if find_spec(module) is None:
-        raise InputError(f"{what} needs {module}; pip install 'msfp-gen[{extra}]'")
+        raise InputError(f"{what} needs {module}; pip install {module.lower()}")
 
 
 def simulate_batch(

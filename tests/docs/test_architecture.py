@@ -183,22 +183,21 @@ def distributions(requirements):
     return {re.split(r"[^A-Za-z0-9-]", text)[0].lower() for text in requirements}
 
 
-def test_every_library_is_installed_with_the_package_or_its_extra_is_named():
-    """A module of an extra has a `require` that states the command; all others are plain dependencies."""
+def test_every_library_is_installed_with_the_package_or_by_a_command_that_is_stated():
+    """A module of an extra has a `require`, whose command installs it by its name; all others are dependencies."""
     of_modules = packages_distributions()
     named = {
-        module: extra
-        for path in PACKAGE
-        for module, extra in re.findall(r'require\("(\w+)", "(\w+)"', path.read_text(encoding="utf-8"))
+        module for path in PACKAGE for module in re.findall(r'require\("(\w+)", "', path.read_text(encoding="utf-8"))
     }
-    assert named
+    of_extras = [name for extra in EXTRAS.values() for name in extra]
+    assert named and {module.lower() for module in named} <= distributions(of_extras)
     for path in PACKAGE:
         for top in {module.partition(".")[0] for module in imports_of(path, late=True)}:
             if top in sys.stdlib_module_names or top == "msfp_gen":
                 continue
-            extra = EXTRAS.get(named.get(top, ""), DEPENDENCIES)
+            installed = of_extras if top in named else DEPENDENCIES
             needed = {name.lower().replace("_", "-") for name in of_modules.get(BROUGHT.get(top, top), [top])}
-            assert needed & distributions(extra), f"{path.name} imports {top}, which nothing installs"
+            assert needed & distributions(installed), f"{path.name} imports {top}, which nothing installs"
 
 
 def test_every_dependency_has_its_sentence():

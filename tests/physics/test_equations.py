@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from reference import forces, kinematics, stack
-from support import bearing_of, differences, model_of, thinned
+from support import ROOT, bearing_of, differences, model_of, thinned
 from support.random_states import inputs, sensible
 
-from msfp_gen import Top
+from msfp_gen import Body, Top
+from msfp_gen.specification import contract
 
 LAYOUTS = [(2, 1, 0), (2, 0, 1), (3, 1, 1), (3, 2, 0), (5, 2, 2), (5, 3, 1), (7, 3, 3)]
 SPINS = ["locked", "patch", "free"]
@@ -143,6 +144,35 @@ def test_named_vectors_equal_the_report(layout):
         assert np.abs(found[f"omega'_{k}"] - turn.w_total[k]).max() < 1e-12
         assert np.abs(found[f"alpha'_{k}"] - turn.dw_total[k]).max() < 1e-11
         assert np.abs(found[f"t_{k}"] - turn.t[k]).max() < 1e-14
+
+
+@pytest.mark.parametrize("layout", OFTEN_LAYOUTS)
+def test_the_centroid_is_where_all_texts_say(layout: tuple[int, int, int]) -> None:
+    """z from the bottom of a body above a concave-up surface (3.6), from the top of one above a concave-down (3.10).
+
+    No preset shows it: their bodies have z = l/2.
+    """
+    values, state, h, load = sensible(layout, 5)
+    z = [0.3 * body.height for body in values.bodies]
+    values = replace(
+        values, bodies=tuple(replace(body, centroid=each) for body, each in zip(values.bodies, z, strict=True))
+    )
+    bearing, model = bearing_of(values), model_of(layout)
+    found = model.kinematics(bearing, state.q, state.v, state.a)
+    for k in range(2, layout[0] + 1):
+        face = f"r_{k - 1}{k}" if k <= layout[1] + 1 else f"r_{k}{k}"
+        assert np.linalg.norm(found[f"r_{k}"] - found[face]) == pytest.approx(z[k - 2], rel=1e-9), k
+    condensed = model.evaluate(bearing, state.q, state.v, h, **inputs(state, load))
+    want = stack.solve(values, replace(state, a=np.zeros_like(state.a)), h, load, "locked")
+    scale = 1.0 + np.abs(want.acceleration).max()
+    assert np.abs(condensed.acceleration - want.acceleration).max() < 1e-9 * scale
+    other = tuple(replace(body, centroid=body.height - body.centroid) for body in values.bodies)
+    turned = stack.solve(replace(values, bodies=other), replace(state, a=np.zeros_like(state.a)), h, load, "locked")
+    assert np.abs(turned.acceleration - want.acceleration).max() > 1e-3 * scale
+    told = {value.name: value.meaning for value in contract.BODY}["centroid"]
+    page = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
+    for text in (told, Body.__doc__ or "", page):
+        assert "(3.6)" in text and "(3.10)" in text
 
 
 @pytest.mark.parametrize("layout", OFTEN_LAYOUTS)

@@ -203,10 +203,7 @@ def _bearing(table: Mapping[str, Any]) -> Bearing:
         changes["layout"] = Layout(**changes["layout"])
     for name, kind, word in (("surfaces", Surface, "surface"), ("bodies", Body, "body")):
         changes[name] = [_row(kind, row, word, f"bearing.{name}[{index}]") for index, row in enumerate(changes[name])]
-    if changes.pop("friction_at", "surface") == "surface":
-        return Bearing(**changes)
-    bearing = Bearing(**changes)
-    return bearing.replace(friction=[surface.friction for surface in bearing.surfaces], friction_at="pivot")
+    return Bearing(**changes)
 
 
 @lru_cache(maxsize=16)

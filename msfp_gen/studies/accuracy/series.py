@@ -212,7 +212,7 @@ def run_opensees(scene: Scene, steps: int) -> Trial:
     """
     require_base_motion_only(scene)
     if find_spec("openseespy") is None:
-        raise InputError("TripleFrictionPendulum needs openseespy; pip install 'msfp-gen[opensees]'")
+        raise InputError("TripleFrictionPendulum needs openseespy; pip install openseespy")
     lower, upper, inner = _links(scene)
     try:
         ops = import_module("openseespy.opensees")

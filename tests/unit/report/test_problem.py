@@ -73,7 +73,7 @@ def test_without_ziglang_the_remedy_is_named(tmp_path, monkeypatch, capsys) -> N
     target = tmp_path / "page.html"
     assert main(["explore", "fenz-test2", "-o", str(target)]) == 2
     error = capsys.readouterr().err
-    assert "pip install 'msfp-gen[compiler]'" in error and not target.exists()
+    assert "pip install ziglang" in error and not target.exists()
 
 
 def test_a_bad_name_of_a_file_is_refused_first(tmp_path, capsys) -> None:

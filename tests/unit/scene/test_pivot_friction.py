@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from support import scene_of
 
-from msfp_gen import InputError, load_scene, presets, simulate
+from msfp_gen import Bearing, InputError, load_scene, presets, simulate
 from msfp_gen.scene.effect_selection import doubtful_values
 from msfp_gen.scene.explain import explain
 
@@ -50,6 +50,22 @@ def test_scene_files_take_coefficients_at_the_pivot(tmp_path) -> None:
         '[top]\nkind = "rig"\naxial_load = 112e3\nstiffness = 1e8\n'
     )
     assert load_scene(path).bearing == TFP.replace(friction=PUBLISHED, friction_at="pivot")
+
+
+def test_a_bearing_takes_coefficients_at_the_pivot() -> None:
+    """As files and `replace` do; the bearing keeps those at the surfaces, and copies do not convert them again."""
+    sheet = [replace(surface, friction=mu) for surface, mu in zip(TFP.surfaces, PUBLISHED, strict=True)]
+    bearing = Bearing(TFP.layout, TFP.base_height, sheet, TFP.bodies, friction_at="pivot")
+    want = TFP.replace(friction=PUBLISHED, friction_at="pivot")
+    assert bearing.surfaces == want.surfaces == TFP.replace(surfaces=sheet, friction_at="pivot").surfaces
+    assert replace(bearing, gravity=9.81).surfaces == bearing.replace(gravity=9.81).surfaces == want.surfaces
+    with pytest.raises(InputError, match=r"bearing\.friction_at = 'top': give 'surface' or 'pivot'"):
+        Bearing(TFP.layout, TFP.base_height, sheet, TFP.bodies, friction_at="top")
+    single = presets.bearing("single-fp")
+    with pytest.raises(
+        InputError, match=r"bearing\.friction_at = 'pivot': layout .* give the coefficients at the surf"
+    ):
+        Bearing(single.layout, single.base_height, single.surfaces, single.bodies, friction_at="pivot")
 
 
 @pytest.mark.parametrize("name", ["fenz-tfp", "double-fp", "quintuple-fp"])

@@ -138,7 +138,7 @@ def test_what_does_not_apply_is_left_out_and_said(monkeypatch):
     for name, changes, why in (
         ("massless", {"sliders": "massless"}, "the scene itself has sliders = 'massless'"),
         ("no rims", {"rims": False}, "the scene itself has rims = False"),
-        ("OpenSees", {}, "pip install 'msfp-gen[opensees]'"),
+        ("OpenSees", {}, "pip install openseespy"),
     ):
         scene = scene_of("fenz-test2", changes, duration=1.0)
         trials, notes = _variant_trials(NAMED[name], scene, [1e-2], 5.0, quiet)
