@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from importlib import resources
 from math import inf
@@ -55,7 +55,7 @@ def runtime_symbols() -> list[str]:
 
 def surface_values(spec: ModelSpec) -> list[Value]:
     """The values of a surface in order, those of its friction law and drilling moment included."""
-    known = {value.name: value for value in (*contract.SURFACE, *contract.SURFACE_UPLIFT)}
+    known = {value.name: value for value in contract.EVERY_SURFACE}
     return [(known | contract.NUMBERS)[name] for name in contract.surface_values(spec.effects)]
 
 
@@ -63,7 +63,7 @@ def effects_text(spec: ModelSpec) -> str:
     """The effects of a model in one line."""
     e = spec.effects
     law = f" (mu = {e.law.text})" if e.law is not None else ""
-    switches = {"rims": e.rims, "uplift": e.uplift, "top_rotation": e.top_rotation}
+    switches = {field.name: on for field in fields(e) if isinstance(on := getattr(e, field.name), bool)}
     words = [f"dimension {e.dimension}", f"spin {e.spin}", f"sliders {e.sliders}"]
     words += [f"{name} {'on' if on else 'off'}" for name, on in switches.items()]
     return ", ".join([*words, f"hysteresis law {e.bouc_wen}", f"friction {e.friction}{law}"])

@@ -55,7 +55,6 @@ def number_fields(effects: Effects) -> list[Field]:
 
 def value_blocks(effects: Effects) -> ValueBlocks:
     """The values of a model; those of a surface end with the numbers of friction law and drilling moment."""
-    surface = contract.SURFACE + (contract.SURFACE_UPLIFT if effects.uplift else ())
     gravity = Field("gravity", "m/s^2", "gravitational acceleration")
     sides = (
         Field("sign_lower", "-", "+1: the surface below is concave up, -1: concave down; 1 under the base"),
@@ -67,7 +66,7 @@ def value_blocks(effects: Effects) -> ValueBlocks:
     compliance = Field("compliance", "m/N", "of all unilateral contacts in series; 0 without uplift")
     return ValueBlocks(
         body_values=_values("body", contract.BODY),
-        surface_values=_values("surface", surface, number_fields(effects)),
+        surface_values=_values("surface", contract.surface_of(effects), number_fields(effects)),
         top_values=_values("top", contract.TOP),
         sides=_block("sides", sides),
         side=_block("side", (Field("sign", "-", "+1 concave up, -1 concave down"),)),

@@ -250,7 +250,10 @@ class Program:
                 if isinstance(part, str):
                     self.results[part] = self.let(component, "out")
                 elif sp.sympify(component) != part:
-                    raise AssertionError(f"{self.name}: {quantity} should be {part}, is {component}")
+                    raise AssertionError(
+                        f"{self.name}: {quantity} of block {block.name} is {component}, but generator/blocks.py keeps "
+                        f"it at {part} in a planar model; store it there, with None in place of {part}"
+                    )
         unknown = set(values) - set(block.quantities)
         if unknown:
             raise AssertionError(f"{self.name}: {sorted(unknown)} are not in block {block.name}")

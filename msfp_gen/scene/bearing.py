@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.top import NodeTop
 
 _BODY = rules(contract.BODY)
-_SURFACE = rules((*contract.SURFACE, *contract.SURFACE_UPLIFT, *contract.NUMBERS.values()))
+_SURFACE = rules((*contract.EVERY_SURFACE, *contract.NUMBERS.values()))
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Body:
 
 _LISTS: dict[str, type] = {"surfaces": Surface, "bodies": Body}
 _SURFACE_ARRAYS = tuple(  # the stiffness of unilateral contacts depends on the top where it is not given
-    name for name in contract.names((*contract.SURFACE, *contract.SURFACE_UPLIFT)) if name != "seat_stiffness"
+    name for name in contract.names(contract.EVERY_SURFACE) if name != "seat_stiffness"
 )
 
 

@@ -14,6 +14,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.standing import standing_of, unsteady
 from msfp_gen.scene.top import MassTop, RigTop, Top, load_values, sprung_mass
+from msfp_gen.specification import contract
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ SOFTEST_RIM = 0.5  # compression of a rim by this load, over the capacity
 def scene_doubts(scene: SceneFields) -> Iterator[tuple[int, float, str]]:
     """Doubts about values of the bearing of a scene, and about the springs that hold its top plate up."""
     yield from doubtful_values(scene.bearing, 0.0 if scene.effects.rims is False else load_at_rest(scene))
+    yield from unread_values(scene.bearing, scene.effects)
     if standing := standing_of(scene):
         yield from unsteady(*standing[:3])
     if (mass := sprung_mass(scene.top)) and isinstance(scene.top, MassTop):
@@ -117,6 +119,22 @@ def doubtful_values(bearing: Bearing, load: float = 0.0) -> Iterator[tuple[int, 
                 f"at rest, {load:.4g} N; is it in N/m, not in kN/mm?"
             )
             yield number, surface.rim_stiffness, text
+
+
+def unread_values(bearing: Bearing, effects: Effects | Auto) -> Iterator[tuple[int, float, str]]:
+    """Values of an effect that is off: number of the surface, the value, and the text of the doubt."""
+    for effect, values in contract.SURFACE_OF_EFFECTS.items():
+        if getattr(effects, effect) is not False:
+            continue
+        for number, surface in enumerate(bearing.surfaces, start=1):
+            for name in contract.names(values):
+                value = getattr(surface, name)
+                if value is not None and value != getattr(type(surface), name):
+                    text = (
+                        f"bearing.surfaces[{number - 1}].{name} = {value:g}: effects.{effect} = false, so that nothing "
+                        f"reads it; leave it out, or give {effect} = true"
+                    )
+                    yield number, value, text
 
 
 MIN_LOAD_SHARE = 0.2  # uplift is left out if more than this share of the load at rest remains throughout the run

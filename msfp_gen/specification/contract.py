@@ -55,18 +55,21 @@ SURFACE = (  # of each surface, the lowest first
     Value("rim_damping", _DAMPING, "damping c_c of the rim"),
     Value("contact_damping", Quantity("s", least=0.0), "damping time T of the sheared contact"),
 )
-SURFACE_UPLIFT = (  # after those, in models with uplift
-    Value(
-        "seat_stiffness",
-        Quantity("N/m", above=0.0),
-        "stiffness of the unilateral contact; the top's contain those of all surfaces in series",
+SURFACE_OF_EFFECTS: dict[str, tuple[Value, ...]] = {  # after those, in models with the effect
+    "uplift": (
+        Value(
+            "seat_stiffness",
+            Quantity("N/m", above=0.0),
+            "stiffness of the unilateral contact; the top's contain those of all surfaces in series",
+        ),
+        Value(
+            "seat_damping",
+            Quantity("s/m", least=0.0),
+            "damping of the unilateral contact, over its stiffness and compression",
+        ),
     ),
-    Value(
-        "seat_damping",
-        Quantity("s/m", least=0.0),
-        "damping of the unilateral contact, over its stiffness and compression",
-    ),
-)
+}
+EVERY_SURFACE = (*SURFACE, *(value for values in SURFACE_OF_EFFECTS.values() for value in values))
 SURFACE_BOUNDS = (  # of a surface and the rim_radius of its slider, the body that meets its rim
     Bound("capacity", "pi / 2 * radius", "a quarter turn on its sphere", open=True),
     Bound("rim_radius", "radius", "the radius of the surface it slides in", open=True),
@@ -157,10 +160,15 @@ LARGEST_FRICTION_STATE = 1.0 + 1e-9  # Y^2 + Z^2: friction does not exceed mu N;
 MAX_ROWS = 1e8  # output rows of a run; about 100 GB
 
 
+def surface_of(effects: Effects) -> tuple[Value, ...]:
+    """The values of a surface that every model with these effects has, in order."""
+    of_effects = (values for effect, values in SURFACE_OF_EFFECTS.items() if getattr(effects, effect))
+    return (*SURFACE, *(value for values in of_effects for value in values))
+
+
 def surface_values(effects: Effects) -> tuple[str, ...]:
     """Names of the values of a surface in order: the numbers of friction law and drilling moment come last."""
-    uplift = SURFACE_UPLIFT if effects.uplift else ()
-    return (*(value.name for value in SURFACE + uplift), *effects.surface_numbers)
+    return (*names(surface_of(effects)), *effects.surface_numbers)
 
 
 @dataclass(frozen=True)

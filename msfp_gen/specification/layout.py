@@ -7,12 +7,13 @@ motions and loads are values of other classes: changing them never recompiles.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.specification.friction_laws import FRICTION, HYSTERESIS, SPIN, Law, Spin, has_closed_form, law_of
 
+T = TypeVar("T")
 _COUNT = Quantity("", least=0, whole=True)
 
 
@@ -185,14 +186,28 @@ class Effects:
         return quasistatic and self.law is None and has_closed_form(self.bouc_wen)
 
 
+OF_THE_SCENE = ("top_rotation",)
+"""Fields of `Effects` that follow from the parts of a scene."""
+
+
+def _with_other_effects(kind: type[T]) -> type[T]:
+    """Give a class the fields of `Effects` that it does not state, with their rules and defaults."""
+    for field in fields(Effects):
+        if field.name not in (*kind.__annotations__, *OF_THE_SCENE):
+            kind.__annotations__[field.name] = Effects.__annotations__[field.name]
+            setattr(kind, field.name, field.default)
+    return kind
+
+
 @dataclass(frozen=True)
+@_with_other_effects
 class Auto:
     """Effects of which those that are None are selected from the scene by stated criteria (docs/effects.md).
 
     Attributes:
         dimension, sliders, rims, uplift: a value of `Effects` to prescribe, or None to select it.
         friction: a value of `Effects`; None: the law whose parameters the surfaces define.
-        spin, bouc_wen, friction_law: as in `Effects`.
+        spin, bouc_wen, friction_law: as in `Effects`, and so is any other of its fields that the scene does not decide.
         error: permitted change of the result by all effects left out, as a share of the friction force.
 
     Raises:

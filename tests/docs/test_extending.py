@@ -12,8 +12,19 @@ from pathlib import Path
 import pytest
 from support import ROOT
 
-BLOCKS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(encoding="utf-8"), re.DOTALL)
-LAW, NUMBER, FIELD, MEMORY, REMEMBERING, NUMBERS, FIELDS, SWITCHES, SEAL, SEAL_NUMBER, SEAL_FIELD, DRILLING = BLOCKS
+from msfp_gen.generator.blocks import make_blocks
+from msfp_gen.generator.program import Program
+
+PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+# The blocks of a list are indented as its text is.
+BLOCKS = [
+    re.sub(f"^{indent}", "", block, flags=re.MULTILINE)
+    for indent, block in re.findall(r"^( *)```python\n(.*?)```", PAGE, re.DOTALL | re.MULTILINE)
+]
+LAW, NUMBER, FIELD, MEMORY, REMEMBERING, NUMBERS, FIELDS, SWITCHES, SEAL, SEAL_NUMBER, SEAL_FIELD, DRILLING = BLOCKS[
+    :12
+]
+FILM, FILM_NUMBER, FILM_FIELD = BLOCKS[12:]
 
 
 def entries(block: str) -> str:
@@ -29,9 +40,15 @@ WHERE = {
     ("msfp_gen/specification/friction_laws.py", "HYSTERESIS = {\n"): SWITCHES,
     ("msfp_gen/specification/friction_laws.py", "SPIN = {\n"): SEAL,
     ("msfp_gen/specification/friction_laws.py", "_SPIN_NUMBERS: tuple[Value, ...] = ("): f"{SEAL_NUMBER.strip()},",
-    ("msfp_gen/scene/bearing.py", "    friction_slow: Annotated[float | None"): FIELD + FIELDS + SEAL_FIELD,
+    ("msfp_gen/scene/bearing.py", "    friction_slow: Annotated[float | None"): FIELD
+    + FIELDS
+    + SEAL_FIELD
+    + FILM_FIELD,
+    ("msfp_gen/specification/layout.py", "    top_rotation: Annotated["): FILM,
+    ("msfp_gen/specification/contract.py", '    "uplift": ('): FILM_NUMBER,
     ("tests/reference/forces.py", "DRILLING = {\n"): DRILLING,
 }
+AFTER = {place for _, place in WHERE if place.endswith(("\n", "= ("))}
 SCENE = """
 from dataclasses import replace
 from msfp_gen import Effects, load_scene
@@ -52,7 +69,7 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
         path = root / name
         text = path.read_text(encoding="utf-8")
         assert text.count(place) == 1, f"{name}: {place!r} is not there"
-        shown = place + block if place.endswith(("\n", "(")) else block + place
+        shown = place + block if place in AFTER else block + place
         path.write_text(text.replace(place, shown), encoding="utf-8")
     return root
 
@@ -99,6 +116,54 @@ def test_numbers_that_are_missing_are_named(extended: Path) -> None:
     without = SCENE.replace("pressure_drop=0.02, ", "").replace("scene = replace", "try:\n    scene = replace")
     out = run(extended, without + "except Exception as error:\n    print(error)\n")
     assert re.search(r"surfaces\[0\]\.pressure_drop is missing .*'pressure' needs it", out)
+
+
+def test_a_new_effect_is_accepted_wherever_effects_are(extended: Path, tmp_path: Path) -> None:
+    """In scene files, complete and selected, options, names and texts; its number is noted without it."""
+    scene = tmp_path / "film.toml"
+    scene.write_text(
+        'bearing = { preset = "fenz-tfp", film_damping = 20.0 }\n'
+        '[motion]\nkind = "harmonic"\namplitude = 0.05\nfrequency = 0.1\n'
+        '[top]\nkind = "rig"\naxial_load = 112e3\nstiffness = 1e8\n'
+    )
+    out = run(
+        extended,
+        f"""
+from dataclasses import replace
+from msfp_gen import Auto, Effects, load_scene
+from msfp_gen.cli import main
+from msfp_gen.generator.interface import effects_text
+from msfp_gen.scene.effect_selection import scene_doubts
+path = {str(scene)!r}
+text = open(path).read()
+plain = load_scene(path)
+print([doubt for _, _, doubt in scene_doubts(plain)])
+complete = 'film = true\\ndimension = "planar"\\nsliders = "inertial"\\nrims = true\\nuplift = false'
+for table in ("film = true", complete):
+    open(path, "w").write(text + "[effects]\\n" + table + "\\n")
+    found = load_scene(path)
+    assert found.effects.film is True and found.modelled.film is True, found
+    assert found.spec.key.endswith("-film") and "film on" in effects_text(found.spec)
+    assert not any("film" in doubt for _, _, doubt in scene_doubts(found))
+    print(type(found.effects).__name__)
+try:
+    Auto(film="yes")
+except Exception as error:
+    print(error)
+main(["generate", "--help"])
+""",
+    )
+    told = "film_damping = 20: effects.film = false, so that nothing reads it; leave it out, or give film = true"
+    assert out.count(told) == 4 and "Auto" in out and "Effects" in out
+    assert "effects.film = 'yes': give " in out
+    assert "--film" in out
+
+
+def test_a_field_that_is_constant_in_the_plane_names_its_file() -> None:
+    blocks = make_blocks(planar=True, uplift=False)
+    program = Program("tilted", "a force across the plane")
+    with pytest.raises(AssertionError, match=r"tilted: F of block force is 1, but generator/blocks\.py keeps it at 0"):
+        program.write(blocks.force, {"F": (0, 1, 0)})
 
 
 @pytest.mark.slow

@@ -83,7 +83,7 @@ def test_python_knows_the_same_words() -> None:
     assert get_args(get_type_hints(Event)["kind"]) == names(contract.EVENT_KINDS)
     assert set(get_args(get_type_hints(Solver)["method"])) == set(names(contract.METHODS))
     assert set(names(contract.WORKS)) <= set(ENERGY)
-    assert {value.name for value in contract.SURFACE + contract.SURFACE_UPLIFT} <= {f.name for f in fields(Surface)}
+    assert {value.name for value in contract.EVERY_SURFACE} <= {f.name for f in fields(Surface)}
 
 
 def test_every_status_that_ends_a_run_says_why() -> None:
