@@ -3,7 +3,8 @@
  * The friction force (3.16) over -mu N is g = f + T df/dt, with f = (Y, Z) and the damping time T of the contact. With
  * the stage formula f = fp + beta df/dt it is g = fp + (beta + T) df/dt. For each surface, Newton's method solves this
  * for g, and mu from its law: two or three local unknowns, from which f follows. They are eliminated from the tangent
- * of the moment and of N by their consistent tangent.
+ * of the moment and of N by their consistent tangent. Where mu follows the slip velocity strongly and bodies turn about
+ * the contact normal, mu is bracketed instead (docs/friction.md, "One coefficient or three").
  */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("O3") /* unrolls the loops over surfaces */
@@ -87,8 +88,9 @@ MSFP_INLINE void solve_small(const double *a, double *b)
 
 /* One Newton step on g (and mu) of every surface that has not converged, with derivatives at constant slip velocity
  * and N, on which they depend weakly. Where the residual has grown, past a switch of the hysteresis law, half of the
- * last step is taken back. Returns how many surfaces have not converged, -1 if a value is not finite. */
-MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, double *step, double *best)
+ * last step is taken back. held: mu stays as it is, whatever its law gives. Returns how many surfaces have not
+ * converged, -1 if a value is not finite. */
+MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, int held, double *step, double *best)
 {
     double a[FRICTION * FRICTION * LANES], newton[FRICTION * LANES], size[LANES], sum[LANES];
     const double *out = all->out, *tau = all->stage + MSFP_STAGE_TAU * LANES;
@@ -106,7 +108,7 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, double *st
 #if MSFP_LAW
     double excess[LANES];
     for (int s = 0; s < LANES; ++s) {
-        excess[s] = all->x[s] - out[MSFP_CONTACT_MU * LANES + s];
+        excess[s] = held ? 0.0 : all->x[s] - out[MSFP_CONTACT_MU * LANES + s];
         size[s] = fabs(excess[s]) > size[s] ? fabs(excess[s]) : size[s];
         sum[s] += fabs(excess[s]);
     }
@@ -131,7 +133,7 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, double *st
             change += out[(MSFP_CONTACT_LAW_Y + c) * LANES + s] * newton[c * LANES + s];
         change = overshot ? 0.5 * step[FRICTION * LANES + s] : change / (1.0 - SLOPE(out, s));
         step[FRICTION * LANES + s] = change;
-        all->x[s] += sign * change;
+        all->x[s] += held ? 0.0 : sign * change;
 #endif
         for (int r = 0; r < FRICTION; ++r) {
             step[r * LANES + s] = overshot ? 0.5 * step[r * LANES + s] : newton[r * LANES + s];
@@ -142,19 +144,74 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, double *st
     return unconverged;
 }
 
-/* g (and mu) of all surfaces by Newton's method on their stage formula. */
-MSFP_INLINE int friction_stage(const double *par, lanes *all, double beta, double accuracy)
+/* g (and mu, unless it is held) of all surfaces by Newton's method on their stage formula. */
+MSFP_INLINE int friction_by_newton(const double *par, lanes *all, double beta, double accuracy, int held)
 {
     double step[UNKNOWNS * LANES] = { 0 }, best[LANES];
     for (int s = 0; s < LANES; ++s)
         best[s] = INFINITY;
     for (int i = 0; i < 60; ++i) {
         msfp_contact_lanes(par, all->stage, all->contact_frame, all->g MSFP_IF_LAW(all->x), all->out);
-        const int unconverged = newton_step(all, beta, accuracy, step, best);
+        const int unconverged = newton_step(all, beta, accuracy, held, step, best);
         if (unconverged <= 0)
             return unconverged == 0 ? MSFP_OK : i == 0 ? MSFP_E_FINITE : MSFP_E_NEWTON;
     }
     return MSFP_E_NEWTON;
+}
+
+#if MSFP_LAW
+/* mu of every surface as the root of its excess over the law, each with the g that belongs to it. From the present mu
+ * the steps double towards the law until the sign of the excess changes, so that a root is found that is stable and on
+ * the present branch as long as this exists; regula falsi (Illinois) follows. */
+static int friction_by_bracket(const double *par, lanes *all, double beta, double accuracy)
+{
+    double last[LANES], last_excess[LANES], other[LANES], other_excess[LANES], reach[LANES];
+    int bracketed[LANES] = { 0 };
+    for (int i = 0; i < 100; ++i) {
+        const int status = friction_by_newton(par, all, beta, accuracy, 1);
+        int unconverged = 0;
+        if (status)
+            return status;
+        for (int s = 0; s < LANES; ++s) {
+            const double x = all->x[s], excess = x - all->out[MSFP_CONTACT_MU * LANES + s];
+            if (fabs(excess) <= accuracy)
+                continue;
+            ++unconverged;
+            if (i > 0 && excess * last_excess[s] < 0.0) {
+                other[s] = last[s];
+                other_excess[s] = last_excess[s];
+                bracketed[s] = 1;
+            } else if (bracketed[s])
+                other_excess[s] *= 0.5;
+            reach[s] = i > 0 ? 2.0 * reach[s] : excess;
+            last[s] = x;
+            last_excess[s] = excess;
+            all->x[s] -= bracketed[s] ? excess * (x - other[s]) / (excess - other_excess[s]) : reach[s];
+        }
+        if (!unconverged)
+            return MSFP_OK;
+    }
+    return MSFP_E_NEWTON;
+}
+#endif
+
+/* g (and mu) of all surfaces. */
+MSFP_INLINE int friction_stage(const double *par, lanes *all, double beta, double accuracy)
+{
+#if MSFP_LAW
+    double g[FRICTION * LANES], x[MSFP_COEFFICIENT_SIZE * LANES];
+    memcpy(g, all->g, sizeof g);
+    memcpy(x, all->x, sizeof x);
+#endif
+    const int status = friction_by_newton(par, all, beta, accuracy, 0);
+#if MSFP_LAW
+    if (status == MSFP_E_NEWTON) {
+        memcpy(all->g, g, sizeof g);
+        memcpy(all->x, x, sizeof x);
+        return friction_by_bracket(par, all, beta, accuracy);
+    }
+#endif
+    return status;
 }
 
 /* Row of the kernel's Jacobian (M, dY, dZ, mu, N) that is row r of MSFP_CONTACT_ROWS. */
