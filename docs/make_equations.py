@@ -6,11 +6,15 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+import sympy as sp
+from sympy.simplify.fu import TR8
+
+from msfp_gen import symbolic
 from msfp_gen.common.output import replacing
 from msfp_gen.common.tables import markdown_table
 from msfp_gen.generator import body, contact, energy, laws, parameters, top, two_port
 from msfp_gen.generator.derive import derive
-from msfp_gen.generator.latex import assembled_latex, statements
+from msfp_gen.generator.latex import statements, to_latex
 from msfp_gen.generator.schedule import Decision, Over, Pass, condensed, momentum_balances, passes_of
 from msfp_gen.generator.schedule import two_port as ends
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
@@ -153,6 +157,50 @@ def block(rows: list[str]) -> str:
     """One displayed block of aligned rows."""
     inner = " \\\\\n".join(rows)
     return f"$$\n\\begin{{aligned}}\n{inner}\n\\end{{aligned}}\n$$"
+
+
+def symbol(name: str) -> sp.Symbol:
+    """A symbol of the stack."""
+    return sp.Symbol(name, real=True)
+
+
+def assembled() -> tuple[dict[str, sp.Expr], dict[sp.Symbol, str]]:
+    """Explicit equations of the planar stack (2, 1, 0) without rim contact, springs and mass of the top.
+
+    Returns the balances E1, E3 [N], t2 [N m] and dY [1/s], and the LaTeX of their symbols.
+    """
+    small = symbolic(Layout(2, 1, 0), Effects(dimension="planar", rims=False, bouc_wen="report"))
+    without = {s: 0 for s in small.parameters if s.name.endswith("_T") or s.name in ("k_R", "c_R", "u_01", "T_1")}
+    found = {}
+    for rows in (small.residual, small.friction_rates):
+        for name, value in zip(rows.names, rows.subs(without).expanded(), strict=True):
+            found[name.partition("_")[0]] = value
+    return found, dict(small.residual.latex_names)
+
+
+def readable(expression: sp.Expr) -> sp.Expr:
+    """An expression in few terms: products of sines and cosines combined, masses and forces factored out."""
+
+    def by_angle(factor: sp.Expr) -> sp.Expr:
+        return sp.collect(factor, sorted(factor.atoms(sp.sin, sp.cos), key=str), sp.factor)
+
+    heads = [symbol(name) for name in ("m_2", "N_1", "F_1", "F_3")]
+    return sp.collect(sp.expand(TR8(sp.expand(expression))), heads, by_angle)
+
+
+def over_level_base(expression: sp.Expr) -> sp.Expr:
+    """An expression for a base that translates without rotation: theta_1 = 0."""
+    return expression.xreplace({symbol(f"{dots}theta_1"): sp.Integer(0) for dots in ("", "d", "dd")})
+
+
+def assembled_latex() -> dict[str, list[str]]:
+    """LaTeX of `assembled` for a base without rotation: the signed terms of each sum."""
+    equations, names = assembled()
+    rows = {}
+    for name, expression in equations.items():
+        terms = [to_latex(term, names) for term in readable(over_level_base(expression)).as_ordered_terms()]
+        rows[name] = [term if i == 0 or term.startswith("-") else f"+ {term}" for i, term in enumerate(terms)]
+    return rows
 
 
 def assembled_section() -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import sympy as sp
 from sympy.printing.c import C99CodePrinter
@@ -141,3 +142,35 @@ _PRINTER = Printer()
 def to_c(expression: sp.Expr) -> str:
     """C text of one expression, cached, since models share most of their statements."""
     return str(_PRINTER.doprint(expression))
+
+
+def to_python(expression: sp.Expr) -> str:
+    """Python text of one small expression, in which functions are those of `in_numpy`."""
+    if expression.is_Symbol:
+        return str(expression.name)
+    if expression.is_Integer:
+        return f"({expression})" if expression < 0 else str(expression)
+    if expression.is_Number:
+        return f"({float(expression)!r})"
+    if expression.is_Add or expression.is_Mul:
+        return f"({(' + ' if expression.is_Add else '*').join(map(to_python, expression.args))})"
+    if expression.is_Pow:
+        base, exponent = map(to_python, expression.args)
+        special = {-1: f"(1.0/{base})", sp.Rational(1, 2): f"sqrt({base})", sp.Rational(-1, 2): f"(1.0/sqrt({base}))"}
+        return special.get(expression.exp, f"{base}**{exponent}")
+    return f"{expression.func.__name__}({', '.join(map(to_python, expression.args))})"
+
+
+def in_numpy() -> dict[str, Any]:
+    """The functions of `to_python`, in NumPy."""
+    import numpy as np
+
+    names = ("sin", "cos", "sqrt", "exp", "log", "tanh", "atan2")
+    return {name: getattr(np, name.replace("atan2", "arctan2")) for name in names} | {
+        "Step": lambda x: np.where(x > 0, 1.0, 0.0),
+        "Select": lambda condition, chosen, other: np.where(condition > 0, chosen, other),
+        "Decay": lambda x: np.exp(-np.maximum(x, 0.0)),
+        "Clamp": lambda x: np.clip(x, -1.0, 1.0),
+        "ArcTan2": np.arctan2,
+        "Modulus": np.abs,
+    }

@@ -556,8 +556,8 @@ def passes_of(schedule: Schedule) -> Iterator[Pass]:
         yield from passes
 
 
-def unrolled(passes: Iterable[Pass], signs: Sequence[int]) -> Iterator[tuple[str, list[Place], list[Place]]]:
-    """The programs of a stack one by one, each with the places that it reads and writes.
+def unrolled(passes: Iterable[Pass], signs: Sequence[int]) -> Iterator[tuple[Call, list[Place], list[Place]]]:
+    """The calls of a stack one by one, each with the places that it reads and writes.
 
     signs: +1 or -1 for each surface, concave up or down.
     """
@@ -583,7 +583,7 @@ def unrolled(passes: Iterable[Pass], signs: Sequence[int]) -> Iterator[tuple[str
         for number in numbers[one.over]:
             for call in one.calls:
                 reads, writes = ([numbered(place, number) for place in places] for places in (call.reads, call.writes))
-                yield call.program, reads, writes
+                yield call, reads, writes
 
 
 def tangent_of(program: Program) -> Program:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from msfp_gen.common.errors import RunError as RunError
     from msfp_gen.embedding.two_port import TwoPort as TwoPort
     from msfp_gen.model.model import build_model as build_model
+    from msfp_gen.model.symbolic import symbolic as symbolic
     from msfp_gen.motions.motion import Motion as Motion
     from msfp_gen.motions.prescribed import Load as Load
     from msfp_gen.motions.prescribed import Rotation as Rotation
@@ -90,6 +91,7 @@ _MODULES = {
     "simulate": "simulation.simulate",
     "simulate_batch": "studies.batch",
     "study": "studies.run",
+    "symbolic": "model.symbolic",
 }
 
 __all__ = [*_MODULES, "__version__"]

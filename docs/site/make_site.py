@@ -100,7 +100,7 @@ def help_of(*command: str) -> str:
 
 
 def write_gallery(folder: Path) -> None:
-    """A script for every scene, notebook and library in examples/, for sphinx-gallery to run."""
+    """A script for every scene, notebook, library and script with cells in examples/, for sphinx-gallery to run."""
     folder.mkdir()
     title = "Examples"
     (folder / "GALLERY_HEADER.rst").write_text(
@@ -115,6 +115,9 @@ def write_gallery(folder: Path) -> None:
         shutil.copy(ROOT / "examples" / "libraries" / f"{name}.py", folder / f"plot_{name}.py")
     for path in sorted((ROOT / "examples").glob("*.ipynb")):
         (folder / f"plot_{path.stem}.py").write_text(notebook_script(path), encoding="utf-8")
+    for path in sorted((ROOT / "examples").glob("*.py")):
+        if "# %%" in path.read_text(encoding="utf-8"):
+            shutil.copy(path, folder / f"plot_{path.name}")
 
 
 def scene_script(path: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -66,6 +67,32 @@ def generate(
     show([build_table(info)])
     if output is not None:
         note(f"start with {write_guide(spec, info.folder, info.module)}; for C and Fortran: msfp-gen export")
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen equations 2 1 0 --planar --no-rims\n  msfp-gen equations 5 2 2 --latex > a.tex"
+)
+@with_effects
+def equations(
+    n: Annotated[
+        int, typer.Argument(parser=whole_number, metavar="N", help="Number of bodies, with base and top plate.")
+    ],
+    m: Annotated[
+        int, typer.Argument(parser=whole_number, metavar="M", help="Number of concave-up surfaces, the lower ones.")
+    ],
+    p: Annotated[
+        int, typer.Argument(parser=whole_number, metavar="P", help="Number of concave-down surfaces; n = m + p + 1.")
+    ],
+    latex: Annotated[bool, typer.Option("--latex", help="A LaTeX document, in the symbols of PEER 2017/07.")] = False,
+    planar: Annotated[bool, typer.Option("--planar", help="The same as --dimension planar.")] = False,
+    *,
+    effects: Effects,
+) -> None:
+    """Print the equations of motion of a stack: positions and rates, momentum balances, rates of friction."""
+    from msfp_gen.model.symbolic import symbolic
+
+    model = symbolic(Layout(n, m, p), replace(effects, dimension="planar") if planar else effects)
+    say(model.latex() if latex else str(model))
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen explain fenz-test2\n  msfp-gen explain scene.toml")

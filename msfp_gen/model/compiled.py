@@ -16,6 +16,7 @@ from msfp_gen.scene.standing import seat_stiffness
 from msfp_gen.scene.top import MassTop, Top, load_values
 from msfp_gen.specification import contract
 from msfp_gen.specification.contract import STATUSES
+from msfp_gen.specification.layout import point_names
 
 if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
@@ -387,14 +388,10 @@ def named_vectors(n: int, points: Array, rotations: Array, bases: Array) -> dict
     t_3 of each body.
     """
     out: dict[str, Array] = {}
-    between = "" if n < 10 else "_"  # "11" would be both a point of body 1 and the centre of body 11
+    order = ("lo", "cm", "up", "sc")
+    for body, point, name in point_names(n):
+        out |= {f"{kind}_{name}": points[body, order.index(point), j] for j, kind in enumerate("rva")}
     for k in range(1, n + 1):
-        bottom = "01" if k == 1 else f"{k - 1}{between}{k}"
-        top = f"{k}{between}{k}"
-        names = (bottom, str(k), top) if k == n else (bottom, str(k), top, f"{k}c")
-        for i, name in enumerate(names):
-            for j, kind in enumerate("rva"):
-                out[f"{kind}_{name}"] = points[k - 1, i, j]
         for i, kind in enumerate(("omega_{}", "omega'_{}", "alpha_{}", "alpha'_{}")):
             out[kind.format(k)] = rotations[k - 1, i]
         out[f"t_{k}"] = bases[k - 1]

@@ -6,6 +6,7 @@ motions and loads are values of other classes: changing them never recompiles.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Annotated, Literal, TypeVar
 
@@ -269,3 +270,18 @@ class ModelSpec:
             elif value is not None:
                 name += f"[{value.replace(' ', '')}]"
         return f"{name}-gradients" if self.gradients else name
+
+
+def point_names(n: int) -> Iterator[tuple[int, str, str]]:
+    """The named points of a stack of n bodies (3.1)-(3.11): index of the body from 0, which of its points, name.
+
+    Points: "lo" bottom, "cm" centre of mass, "up" top, "sc" sphere centre above. In stacks of ten and more bodies pairs
+    have a stroke, since "11" would be both a point of body 1 and the centre of body 11.
+    """
+    between = "" if n < 10 else "_"
+    for k in range(1, n + 1):
+        yield k - 1, "lo", "01" if k == 1 else f"{k - 1}{between}{k}"
+        yield k - 1, "cm", str(k)
+        yield k - 1, "up", f"{k}{between}{k}"
+        if k < n:
+            yield k - 1, "sc", f"{k}c"

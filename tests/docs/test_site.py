@@ -107,6 +107,7 @@ def test_gallery_runs_every_example(tmp_path: Path) -> None:
     build(tmp_path / "site")
     check_site(tmp_path / "site")
     examples = {path.stem for path in (ROOT / "examples").iterdir() if path.suffix in (".toml", ".ipynb")}
+    examples |= {path.stem for path in (ROOT / "examples").glob("*.py") if "# %%" in path.read_text(encoding="utf-8")}
     shown = {path.stem.removeprefix("plot_") for path in (tmp_path / "site" / "gallery").glob("plot_*.html")}
     assert examples | {"building", "pareto", "sobol"} == shown
     for path in (tmp_path / "site" / "gallery").glob("plot_*.html"):

@@ -11,7 +11,7 @@ from support import ROOT
 from msfp_gen import Bearing, Body, Effects, Layout, Surface, build_model
 from msfp_gen.generator.derive import derive
 from msfp_gen.generator.functions import Step
-from msfp_gen.generator.latex import PLACES, assembled, assembled_latex, over_level_base, readable, statements
+from msfp_gen.generator.latex import PLACES, statements
 from msfp_gen.specification.layout import ModelSpec
 
 
@@ -71,8 +71,10 @@ def number(expression, x):
 def test_assembled_stack_is_what_runs(planar, level):
     """The scalar equations of docs/equations.md against the compiled model: also after they were made readable."""
     rng = np.random.default_rng(5)
-    shown = {name: readable(over_level_base(e) if level else e) for name, e in assembled().items()}
-    for form in (shown, assembled()):
+    script = page_script()
+    assembled, _ = script.assembled()
+    shown = {name: script.readable(script.over_level_base(e) if level else e) for name, e in assembled.items()}
+    for form in (shown, assembled):
         for _ in range(20):
             x = random_numbers(rng, level)
             want = compiled(planar, x)
@@ -82,8 +84,9 @@ def test_assembled_stack_is_what_runs(planar, level):
 
 def test_assembled_equations_hold_nothing_but_known_symbols():
     known = set(random_numbers(np.random.default_rng(0), level=False))
-    assert {s.name for e in assembled().values() for s in e.free_symbols} <= known
-    assert list(assembled_latex()) == ["E1", "E3", "t2", "dY"]
+    script = page_script()
+    assert {s.name for e in script.assembled()[0].values() for s in e.free_symbols} <= known
+    assert list(script.assembled_latex()) == ["E1", "E3", "t2", "dY"]
 
 
 def left_sides(page):
