@@ -9,10 +9,20 @@ import numpy as np
 from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.errors import InputError
-from msfp_gen.scene.fidelity import LEVEL, LOOSE, equivalent_pendulum, implicit_solver, labelled
+from msfp_gen.scene.fidelity import (
+    LEVEL,
+    LOOSE,
+    constant_friction,
+    equivalent_pendulum,
+    implicit_solver,
+    labelled,
+    peak_speed,
+    without_inertia,
+)
 from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.scene_fields import Limits
 from msfp_gen.scene.top import Top
-from msfp_gen.specification.layout import Effects
+from msfp_gen.specification.layout import Auto, Effects
 
 
 def at_fidelity(scene: BuildingScene, word: str) -> BuildingScene | Scene:
@@ -27,8 +37,7 @@ def at_fidelity(scene: BuildingScene, word: str) -> BuildingScene | Scene:
     if word == "loose" and scene.solver.rtol >= LOOSE:
         raise InputError(f"fidelity = 'loose': solver.rtol = {scene.solver.rtol:g} already; give less than {LOOSE:g}")
     bearings = scene.bearings if word == "loose" else [
-        replace(mount, effects=replace(effects, sliders="massless", uplift=False))
-        for mount, effects in zip(scene.bearings, scene.modelled, strict=True)
+        replace(mount, effects=without_inertia(mount.effects or Auto())) for mount in scene.bearings
     ]  # fmt: skip
     building = rigid_building(scene.building) if word == "rigid" else scene.building
     return replace(scene, building=building, bearings=bearings, solver=implicit_solver(scene.solver), fidelity=word)
@@ -60,7 +69,10 @@ def load_shares(scene: BuildingScene) -> list[float]:
 def _equivalent(scene: BuildingScene) -> Scene:
     """The scene of the equivalent pendulum of all bearings, which carries the building as a mass."""
     check_one_ground(scene, "equivalent")
-    bearing = equivalent_pendulum(scene.every_bearing, load_shares(scene))
+    speed, stacks = peak_speed(scene.first_ground, scene.end), []
+    for mount, load in zip(scene.bearings, scene.axial_loads.tolist(), strict=True):
+        stacks.append(constant_friction(mount.bearing, mount.law, load, speed))
+    bearing = equivalent_pendulum(stacks, load_shares(scene))
     mass = float(scene.axial_loads.sum()) / scene.gravity
     springs = [
         float(sum(getattr(mount.interface, name) for mount in scene.bearings))
@@ -71,7 +83,10 @@ def _equivalent(scene: BuildingScene) -> Scene:
         vertical_stiffness=springs[0], vertical_damping=springs[1],
     )  # fmt: skip
     effects = Effects(dimension="spatial", sliders="massless", bouc_wen=scene.modelled[0].bouc_wen)
+    limits = (
+        None if scene.limits is None else Limits(displacement=scene.limits.displacement)
+    )  # no other is of all bearings
     return Scene(
         bearing=bearing, motion=scene.first_ground, top=top, effects=effects, solver=implicit_solver(scene.solver),
-        duration=scene.end, output_step=scene.output_step, name=scene.name, limits=scene.limits, fidelity="equivalent",
+        duration=scene.end, output_step=scene.output_step, name=scene.name, limits=limits, fidelity="equivalent",
     )  # fmt: skip

@@ -29,6 +29,7 @@ from msfp_gen.scene.scene_fields import Fidelity, Limits
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_seats, check_standing, needed_rotational_stiffness
 from msfp_gen.scene.top import NodeTop
+from msfp_gen.specification.friction_laws import Law, law_of
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
 BALANCE = 1e-6  # part of the weight that the bearings do not balance at rest, at most
@@ -70,6 +71,13 @@ class BuildingBearing:
                     f"building_bearing.effects.{name} = {value!r}: a building moves its bearings in space and twists "
                     f"none of them; give {needed!r}"
                 )
+
+    @property
+    def law(self) -> Law | None:
+        """The friction law at the start of a run; None: friction is constant."""
+        requested = self.effects or Auto()
+        formula = requested.friction_law
+        return law_of(requested.friction or select_friction(self.bearing, formula), formula)
 
 
 def standing_below(mount: BuildingBearing, load: float) -> tuple[float, float, float]:

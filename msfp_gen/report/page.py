@@ -121,9 +121,7 @@ def outcome(result: AnyResult) -> str:
             f". Until then exceeded: {lines}" if lines else ""
         )
     if verdict.stopped is not None:
-        limits = (
-            f"Limits of the device exceeded: {lines}" if lines else "Until then it was within the limits of the device"
-        )
+        limits = f"Limits of the device exceeded: {lines}" if lines else f"Until then: {verdict.unexceeded}"
         return f"The run met its stop condition at {verdict.stopped:.4g} s. {limits}."
     return "The run reached its end" + (f". Limits of the device {verdict.text}." if lines else f", {verdict.text}.")
 
@@ -265,7 +263,7 @@ def report_html(
         title_block=title.rows(device),
         scene=result.dataset.attrs["scene"],
         outcome=outcome(result),
-        verdict=result.verdict.word,
+        verdict=result.verdict.word.replace(" ", "-"),
         speeds=SPEEDS,
         data=script_data(data),
         scripts=[Markup(asset(name, page.assets)) for name in (*SCRIPTS, *page.scripts)],

@@ -182,12 +182,12 @@ class Characterisation:
 
     def tables(self) -> list[Table]:
         """Tables of the run, its cycles, the sliding regimes of first loading and last cycle, and the demands."""
-        branches, notes = list(self._named_branches()), [(note,) for note in self.notes]
+        branches, notes, demands = list(self._named_branches()), [(note,) for note in self.notes], self.demand_table()
         return [
             Table(f"{self.title}, {self.status}", (), self.rows()),
             *([self._cycle_table()] if self.cycles else []),
             *([_stage_table(branches)] if branches else []),
-            self.demand_table(),
+            *([demands] if demands.rows else []),
             *([Table("what is not defined in this run, and why", (), notes)] if notes else []),
         ]
 
@@ -322,6 +322,7 @@ NOT_RECORDED = (
     "the rows of a building have no slip velocities: no sliding regimes, velocities and heat of surfaces; periods are "
     "with N at rest"
 )
+NO_STACK = "one pendulum is in place of the stack: no sliding regimes and no demands on surfaces"
 NO_LOOP = "effective stiffness, damping, zero-displacement force and the sliding regimes of a cycle are not defined"
 
 
@@ -333,13 +334,14 @@ def characterise(one: BearingData) -> Characterisation:
     """
     history, load, peaks = one.history, one.axial_load, one.extremes
     path = ForcePath.of(history.time, history.displacement, history.top_force)
-    branch = _branches(one, path) if isinstance(one, RunData) else None
+    branch = _branches(one, path) if isinstance(one, RunData) and not one.one_pendulum else None
     name = one.title if one.number else one.scene.name
     largest = (float(peaks.displacement[3]), float(peaks.top_force[3]))
-    demands = partial(surface_demands, one)
-    characterisation = characterised(
-        name, one.status, path, largest, load, one.bearing.gravity, history.dissipated, demands, branch
-    )
+    common = name, one.status, path, largest, load, one.bearing.gravity, history.dissipated
+    if one.one_pendulum:
+        found = characterised(*common)
+        return replace(found, notes=(*found.notes, NO_STACK))
+    characterisation = characterised(*common, partial(surface_demands, one), branch)
     notes = list(characterisation.notes)
     if any(demand.maximum_uplift is None for demand in characterisation.surfaces):
         notes.append("uplift is not modelled in this run")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import MISSING, asdict, fields
+from dataclasses import MISSING, asdict, fields, replace
 from functools import lru_cache, singledispatch
 from typing import TYPE_CHECKING, Any
 
@@ -130,6 +130,7 @@ def _attributes(result: RunData) -> dict[str, str | int | float]:
     return attributes_of(result, edition(), scene, result.notes, counters) | {
         "extremes": json.dumps(result.extremes.table),
         "motion": PIECES if needs_pieces(result.scene) else RECIPE,
+        **({} if result.scene.fidelity == "exact" else {"fidelity": result.scene.fidelity}),
     }
 
 
@@ -211,7 +212,8 @@ def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> Sc
         raise ValueError(f"motion = {about['motion']!r} is unknown")
     elif isinstance(table.get("motion"), dict) and table["motion"].get("file") is not None:
         raise InputError(f"motion.file = {table['motion']['file']!r}: a result opens no other file; {REMEDY}")
-    return scene_from_table(table, motion=motion)
+    scene = scene_from_table(table, motion=motion)
+    return replace(scene, fidelity=str(about["fidelity"])) if "fidelity" in about else scene
 
 
 def _events(read: Arrays, surfaces: int) -> tuple[Event, ...]:

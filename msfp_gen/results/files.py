@@ -379,7 +379,7 @@ def digest_of_dataset(
 
 
 def _is_read(name: str) -> bool:
-    return name in (*WORDS, "extremes") or name.startswith((COUNTER, PROVENANCE, "motion", "gradient/"))
+    return name in (*WORDS, "extremes", "fidelity") or name.startswith((COUNTER, PROVENANCE, "motion", "gradient/"))
 
 
 def read_result(path: str | Path, *kinds: type[F]) -> F:

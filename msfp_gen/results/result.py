@@ -88,14 +88,16 @@ class AnyResult(ResultFiles, ABC):
     def tables(self) -> list[Table]:
         """The main results, the verdict and the parts as tables, for the console and the report."""
         first = Table(self.title, (), [*self.stated_rows, *self.work_rows()])
-        return [first, self.verdict.table, *self.part_tables()]
+        judged = [self.verdict.table] if self.verdict.readings else []
+        return [first, *judged, *self.part_tables()]
 
     @cached_property
     def verdict(self) -> Verdict:
         """What the device was asked to bear, against its limits (docs/limits.md)."""
         stopped = float(self.bearings[0].history.time[-1]) if self.status == "stopped" else None
         failure = "" if self.succeeded else self.status_text
-        return verdict_of(self.bearings, self.scene.limits, failure, stopped)
+        whole = self.scene.fidelity == "equivalent"
+        return verdict_of(self.bearings, self.scene.limits, failure, stopped, whole)
 
     @property
     def status_text(self) -> str:
@@ -157,7 +159,9 @@ class OneBearing(AnyResult, BearingData):
         return Curve(rows.path[0], rows.top_force[:, :2] @ rows.direction, "force over displacement")
 
     def part_tables(self) -> list[Table]:
-        """Tables of the surfaces, and of the transitions of a monotonic run."""
+        """Tables of the surfaces, and of the transitions of a monotonic run; none of one pendulum in their place."""
+        if self.one_pendulum:
+            return []
         changes = self.summary.get("transitions")
         more = [] if changes is None else [transition_table(changes)]
         return [surface_table(self.summary, self.bearing.surfaces), *more]

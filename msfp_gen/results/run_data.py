@@ -110,6 +110,11 @@ class BearingData(ResultFiles):
         """Name of the bearing in messages below a building; "" for a bearing alone."""
         return ""
 
+    @property
+    def one_pendulum(self) -> bool:
+        """Whether its surfaces are those of one pendulum in place of the stack (docs/fidelity.md)."""
+        return bool(self.scene.fidelity == "equivalent")
+
     if TYPE_CHECKING:  # fields of the subclasses, or properties
 
         @property

@@ -118,7 +118,8 @@ def summarise(result: RunData) -> dict[str, Any]:
         peak_force_ratio: peak radial force over axial load [-]; None without a constant load.
         peak_sliding, minimum_gap: [m]. capacity_used: sliding over capacity, 1 where a slider meets its rim [-].
         minimum_normal_force, maximum_normal_force: [N].
-        friction: coefficients at the surfaces. friction_at_pivot: the same as data sheets give them
+        friction: coefficients at the surfaces. Of a run of one pendulum in place of the stack no key of surfaces is
+            given. friction_at_pivot: the same as data sheets give them
             (`Bearing.friction_at_pivot`); None where there are none [-].
         peak_rim_force: [N].
         uplift: of all surfaces together, see `uplift_of`.
@@ -173,11 +174,15 @@ def summary_of_bearing(one: BearingData) -> dict[str, Any]:
     extremes, load, sheet = one.extremes, one.axial_load, one.bearing.friction_at_pivot
     force = by_axis(extremes.top_force)
     recorded = {key: getattr(extremes, name) for name, key in OF_SURFACES.items()}
-    summary = {
+    summary: dict[str, Any] = {
         "peak_displacement": by_axis(extremes.displacement),
         "peak_force": force,
         "axial_load": load,
         "peak_force_ratio": force["radial"] / load if load else None,
+    }
+    if one.one_pendulum:
+        return summary
+    summary |= {
         **{key: values.tolist() for key, values in recorded.items() if values is not None},
         "capacity_used": (1.0 - extremes.gap / one.bearing.arrays()["capacity"]).tolist(),
         "peak_rim_force": None if extremes.rim_force is None else extremes.rim_force.tolist(),
@@ -207,10 +212,15 @@ def uplift_of(one: BearingData) -> dict[str, Any]:
 def rows_of_bearing(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Label and value of the peaks in the summary of a bearing."""
     ratio = "" if summary["peak_force_ratio"] is None else f" ({summary['peak_force_ratio']:.3f} of the axial load)"
-    least, most = min(summary["minimum_normal_force"]), max(summary["maximum_normal_force"])
-    return [
+    whole = [
         ("peak displacement", _along(summary["peak_displacement"], 1e3, "mm")),
         ("peak force", _along(summary["peak_force"], 1e-3, "kN") + ratio),
+    ]
+    if "peak_sliding" not in summary:  # of one pendulum in place of the stack
+        return whole
+    least, most = min(summary["minimum_normal_force"]), max(summary["maximum_normal_force"])
+    return [
+        *whole,
         ("peak sliding", ", ".join(f"{1e3 * s:.4g}" for s in summary["peak_sliding"]) + " mm, bottom first"),
         ("normal force", f"{1e-3 * least:.4g} to {1e-3 * most:.4g} kN"),
     ]

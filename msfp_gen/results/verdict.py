@@ -20,6 +20,8 @@ from msfp_gen.scene.scene_fields import Limits
 
 RIM_SHARE = 1 / 3  # rim force over the axial load, up to which the spring of a rim was compared
 COMPRESSION_SHARE = 0.1  # compression of a rim over the capacity of its surface
+OF_WHOLE = ("axial_load", "displacement")  # limits of a whole bearing, not of its surfaces
+NO_SURFACES = "the surfaces are not judged: the run has one pendulum in their place"
 SCALES = {"N": (1e-3, "kN"), "m": (1e3, "mm")}  # unit -> factor and unit of texts
 
 
@@ -88,12 +90,14 @@ class Verdict:
     """Values against limits, of one bearing or of all of a building.
 
     readings: of every limit that applies, bearing and surface. failure: how a run failed, else "". stopped: time at
-    which it met its stop condition [s]; None: it did not.
+    which it met its stop condition [s]; None: it did not. whole: whether the run has no surfaces of its bearing, so
+    that limits of the whole bearing alone are judged.
     """
 
     readings: tuple[Reading, ...]
     failure: str = ""
     stopped: float | None = None
+    whole: bool = False
 
     @property
     def ok(self) -> bool:
@@ -116,8 +120,13 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """One of within, stopped, exceeded, failed; what comes after the stop condition is not known."""
-        words = {"failed": self.failure, "exceeded": self.exceeded, "stopped": self.stopped is not None}
+        """One of within, not judged, stopped, exceeded, failed; what comes after the stop condition is not known."""
+        words = {
+            "failed": self.failure,
+            "exceeded": self.exceeded,
+            "stopped": self.stopped is not None,
+            "not judged": self.whole,
+        }
         return next((word for word, holds in words.items() if holds), "within")
 
     @property
@@ -127,9 +136,14 @@ class Verdict:
         if self.failure:
             return "the run failed" + (f"; until then exceeded: {lines}" if lines else "")
         if self.stopped is None:
-            return f"exceeded: {lines}" if lines else "within the limits of the device"
+            return f"exceeded: {lines}" if lines else self.unexceeded
         stop = f"the run met its stop condition at {self.stopped:.4g} s"
-        return f"exceeded: {lines}; {stop}" if lines else f"{stop}; until then within the limits of the device"
+        return f"exceeded: {lines}; {stop}" if lines else f"{stop}; until then {self.unexceeded}"
+
+    @property
+    def unexceeded(self) -> str:
+        """What holds where no limit was exceeded."""
+        return NO_SURFACES if self.whole else "within the limits of the device"
 
     @property
     def exceeded_text(self) -> str:
@@ -159,7 +173,8 @@ class Verdict:
     @property
     def _summary(self) -> str:
         if not self.exceeded:
-            return "within all" + ("" if self.stopped is None else " until the stop condition")
+            stop = "" if self.stopped is None else " until the stop condition"
+            return NO_SURFACES if self.whole else f"within all{stop}"
         bearings = {reading.bearing for reading in self.exceeded} - {0}
         return f"exceeded{f' by {len(bearings)} bearing' + 's' * (len(bearings) > 1) if bearings else ''}"
 
@@ -176,17 +191,22 @@ class Verdict:
 
 
 def verdict_of(
-    bearings: Iterable[BearingData], limits: Limits | None, failure: str, stopped: float | None = None
+    bearings: Iterable[BearingData],
+    limits: Limits | None,
+    failure: str,
+    stopped: float | None = None,
+    whole: bool = False,
 ) -> Verdict:
-    """The verdict of a run. limits: of the scene; None: the defaults. failure, stopped: as of `Verdict`."""
+    """The verdict of a run. limits: of the scene; None: the defaults. failure, stopped, whole: as of `Verdict`."""
     allowed = limits or Limits()
     readings = [
         Reading(limit, one.number, one.label, value)
         for one in bearings
         for limit in LIMITS
+        if limit.key in OF_WHOLE or not whole
         for value in limit.read(one, allowed)
     ]
-    return Verdict(tuple(readings), failure, stopped)
+    return Verdict(tuple(readings), failure, stopped, whole)
 
 
 def _by_surface(one: BearingData, rows: Array, reached: Array, allowed: Array | float) -> Iterator[Value]:

@@ -163,11 +163,12 @@ def monitor_options(
     stops: the monitors that stop it. noted: "uplift", where a load below its limit is to be noted without them.
     """
     heats = effects.law is not None and effects.law.depends_on_temperature
+    stack = scene.fidelity != "equivalent"  # bodies and surfaces of one pendulum are none of the device
     left_out = {
         "rims": not effects.rims,
         "uplift": "uplift" in (*stops, *noted) and not effects.uplift,
-        "inertia": effects.sliders == "massless",
-        "heat": not heats,
+        "inertia": effects.sliders == "massless" and stack,
+        "heat": not heats and stack,
     }
     checked = checked_range(effects.law, scene.bearing, lower_load_limit=not effects.uplift)
     left_out |= {name: name in checked for name in ("law_speed", "law_load", "law_temperature")}

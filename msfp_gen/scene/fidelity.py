@@ -21,14 +21,18 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.scene.bearing import Bearing, Body, Surface
+from msfp_gen.scene.effect_selection import load_at_rest
+from msfp_gen.scene.friction_parameters import coefficient, law_parameters
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import FIDELITIES
 from msfp_gen.scene.top import MassTop, PrescribedTop
-from msfp_gen.specification.layout import Effects, Layout
+from msfp_gen.specification.layout import Auto, Effects, Layout
 
 if TYPE_CHECKING:
+    from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.solver import Solver
     from msfp_gen.scene.top import Top
+    from msfp_gen.specification.friction_laws import Law
 
 
 @dataclass(frozen=True)
@@ -187,6 +191,7 @@ class Backbone:
 
 
 _Scene = TypeVar("_Scene")  # of a bearing or of a building
+AnyEffects = TypeVar("AnyEffects", bound=Effects | Auto)
 EQUAL = 1e-9  # relative difference of slopes that are equal but for rounding
 LOOSE = 1e-2  # relative tolerance of the cheaper models
 JOINT = 0.05  # radius of the joint of the equivalent pendulum, and height of its slider [m]
@@ -199,7 +204,9 @@ UNSEEN = {
     "which a rim is met is less exact",
     "massless": f"fidelity = 'massless': sliders have no inertia, nothing can lift off, and solver.rtol is {LOOSE:g}",
     "equivalent": "fidelity = 'equivalent': one pendulum with the longest sliding regime of the published backbone; it "
-    "does not see the other regimes, the single surfaces and their rims, heat, uplift and the tilt of the top plate",
+    "does not see the other regimes, the single surfaces and their rims, heat, uplift and the tilt of the top plate; "
+    "its friction is constant, by a friction law at the load at rest, the largest velocity of the base and the start "
+    "temperature",
     "rigid": "fidelity = 'rigid': the building is one rigid body; it does not see drifts and floor accelerations",
 }
 
@@ -252,11 +259,17 @@ def _loose(scene: Scene) -> Scene:
 
 
 def _massless(scene: Scene) -> Scene:
-    effects = scene.modelled
-    if effects.sliders == "massless" and scene.solver.rtol >= LOOSE:
+    if scene.modelled.sliders == "massless" and scene.solver.rtol >= LOOSE:
         raise InputError("fidelity = 'massless': the scene has massless sliders already; leave it out")
-    effects = replace(effects, sliders="massless", uplift=False, spin="locked")
+    effects = without_inertia(scene.effects)
+    if not scene.modelled.determines_spin:
+        effects = replace(effects, spin="locked")
     return replace(scene, effects=effects, solver=implicit_solver(scene.solver))
+
+
+def without_inertia(effects: AnyEffects) -> AnyEffects:
+    """The effects with massless sliders; `Auto` still adds rims, heat and the third dimension where they matter."""
+    return replace(effects, sliders="massless", uplift=False)
 
 
 def implicit_solver(solver: Solver) -> Solver:
@@ -269,11 +282,11 @@ def _equivalent(scene: Scene) -> Scene:
         raise InputError("fidelity = 'equivalent': it needs a top of kind 'rig' or 'mass', which holds the plate level")
     if scene.initial_state is not None:
         raise InputError("fidelity = 'equivalent': it starts centred and at rest; leave initial_state out")
-    effects = Effects(
-        dimension=scene.modelled.dimension, sliders="massless", rims=scene.modelled.rims,
-        bouc_wen=scene.modelled.bouc_wen,
-    )  # fmt: skip
-    bearing = equivalent_pendulum([scene.bearing], [1.0])
+    effects = replace(without_inertia(scene.effects), spin="locked", friction="constant", friction_law=None)
+    if isinstance(effects, Effects):
+        effects = replace(effects, top_rotation=False)
+    stack = constant_friction(scene.bearing, scene.law[1], load_at_rest(scene), peak_speed(scene.motion, scene.end))
+    bearing = equivalent_pendulum([stack], [1.0])
     return replace(
         scene,
         bearing=bearing,
@@ -293,6 +306,29 @@ def _level(scene: Scene, bearing: Bearing) -> Top:
         load, lever = top.mass * bearing.gravity, lever + top.height
     held: Top = replace(top, rotational_stiffness=max(top.rotational_stiffness, LEVEL * load * lever))
     return held
+
+
+def peak_speed(motion: Motion, end: float) -> float:
+    """Largest velocity of the base until the end of a run [m/s]."""
+    times = np.append(motion.knots[motion.knots < end], np.linspace(0.0, end, 1001))
+    return float(np.linalg.norm(motion.evaluate(times, 1)[:, :3], axis=1).max())
+
+
+def constant_friction(bearing: Bearing, law: Law | None, load: float, speed: float) -> Bearing:
+    """The bearing with the coefficients that its friction law gives in one state; None: they are constant.
+
+    load: normal force [N]. speed: of sliding [m/s]. What surfaces remember is as at the start of a run.
+    """
+    if law is None:
+        return bearing
+    coefficients = []
+    for index, surface in enumerate(bearing.surfaces):
+        own = law_parameters(law, bearing, index)
+        state = own | {"mu": surface.friction, "v": speed, "N": load, "p": load / own.get("area", float("inf"))}
+        if law.memory is not None:
+            state[law.memory.variable] = own.get(law.memory.start, 0.0)
+        coefficients.append(float(coefficient(law, state)[0]))
+    return bearing.replace(friction=coefficients)
 
 
 def main_regime(backbone: Backbone) -> tuple[float, float, float]:

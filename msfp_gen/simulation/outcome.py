@@ -152,9 +152,10 @@ def _note(kind: str, time: float, value: float, surface: int = 0, **more: float)
 def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
     """The notes that follow from the rows of a whole run; `effects`: of its last segment."""
     unseen = (Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity]),) if scene.fidelity in UNSEEN else ()
-    doubted = () if scene.fidelity == "equivalent" else scene_doubts(scene)
-    doubts = unseen + tuple(Note(0.0, "value", *doubt) for doubt in doubted)
-    physics = footprint_notes(scene, effects, history) + creep_notes(scene, effects, history)
+    stack = scene.fidelity != "equivalent"
+    doubts = unseen + tuple(Note(0.0, "value", *doubt) for doubt in scene_doubts(scene) if stack)
+    physics = footprint_notes(scene, effects, history) if stack else ()
+    physics += creep_notes(scene, effects, history)
     physics += peak_notes(scene, effects, history)
     numerics = energy_notes(scene, history) + tolerance_notes(scene, effects, history)
     return doubts + numerics + damping_notes(scene, history) + physics

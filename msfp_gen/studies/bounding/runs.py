@@ -37,9 +37,9 @@ from msfp_gen.results.characterise import Characterisation
 from msfp_gen.results.quantities import Source, quantities
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.fidelity import check_stack
-from msfp_gen.scene.friction_parameters import proportional, select_friction
+from msfp_gen.scene.friction_parameters import proportional
 from msfp_gen.scene.scene import Scene
-from msfp_gen.specification.friction_laws import Law, law_of
+from msfp_gen.specification.friction_laws import Law
 from msfp_gen.specification.layout import Auto
 from msfp_gen.studies.batch import ENDED, completed_runs
 from msfp_gen.studies.bounding.factors import PROPERTIES, RULES, FactorTable
@@ -260,11 +260,8 @@ def bounded_scene(scene: System, table: FactorTable, case: str) -> System:
     assert isinstance(scene, BuildingScene)
     bearings = []
     for index, mount in enumerate(scene.bearings):
-        requested = mount.effects or Auto()
-        formula = requested.friction_law
-        word = requested.friction or select_friction(mount.bearing, formula)
         with prefixed(f"{scene.label(index)}: "):
-            bearing = _bounded_bearing(mount.bearing, law_of(word, formula), table, case)
+            bearing = _bounded_bearing(mount.bearing, mount.law, table, case)
         bearings.append(replace(mount, bearing=bearing))
     return scene if case == "nominal" else replace(scene, bearings=bearings, name=label)
 

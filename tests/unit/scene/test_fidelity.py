@@ -5,8 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from msfp_gen import InitialState, InputError, Limits, Motion, changed_scene, load_scene, simulate
-from msfp_gen.scene.fidelity import LOOSE, Backbone, at_fidelity, equivalent_pendulum, main_regime
+from msfp_gen import Auto, InitialState, InputError, Limits, Motion, changed_scene, load_scene, simulate
+from msfp_gen.scene.fidelity import (
+    LOOSE,
+    Backbone,
+    at_fidelity,
+    constant_friction,
+    equivalent_pendulum,
+    main_regime,
+    peak_speed,
+)
 from msfp_gen.scene.file.loader import bearing_from_table, scene_table
 from msfp_gen.scene.parameters import parameters_of
 from msfp_gen.studies import load_study
@@ -152,9 +160,73 @@ def test_models_of_one_ground_take_that_of_the_bearings(word):
         run_to_end(at_fidelity(mixed, word))
 
 
-def test_the_equivalent_of_a_building_keeps_its_limits():
-    scene = replace(load_scene("hospital-clc"), limits=Limits(displacement=0.05))
-    assert at_fidelity(scene, "equivalent").limits == scene.limits
+def test_the_equivalent_of_a_building_is_judged_by_its_displacement_alone():
+    """Forces of one bearing are no limits of one pendulum below the whole building."""
+    limits = Limits(displacement=0.05, axial_load=2e6, rim_force=1e5)
+    scene = replace(load_scene("hospital-clc"), limits=limits)
+    assert at_fidelity(scene, "equivalent").limits == Limits(displacement=0.05)
+    assert at_fidelity(scene, "rigid").limits == limits
+
+
+@pytest.mark.parametrize(("factor", "reference"), [(1.4, 5e7), (1.0, 3.4e6)])
+def test_no_level_drops_the_friction_law(factor, reference):
+    """Pressure below the reference raises friction by half, which levels without the law did not see."""
+    changes = {"motion.duration": 20.0, "effects.friction": "pv", "bearing.reference_pressure": reference}
+    exact = simulate(changed_scene("ridgecrest-ccc", changes))
+    mean = float(np.mean(exact.summary["most_friction"]) / np.mean(exact.summary["friction"]))
+    assert mean == pytest.approx(factor, rel=0.1)
+    for word, within in (("massless", 0.02), ("equivalent", 0.12)):
+        run = simulate(changed_scene("ridgecrest-ccc", {**changes, "fidelity": word}))
+        for name in ("peak_displacement", "peak_force"):
+            assert run.summary[name]["radial"] == pytest.approx(exact.summary[name]["radial"], rel=within)
+
+
+def test_the_constant_friction_of_a_law_is_that_of_the_formula():
+    scene = changed_scene("ridgecrest-ccc", {"bearing.surfaces[0].reference_pressure": 2e7})
+    load, speed = 1.1e5, 0.004
+    found = constant_friction(scene.bearing, scene.law[1], load, speed)
+    for index, (surface, made) in enumerate(zip(scene.bearing.surfaces, found.surfaces, strict=True)):
+        pressure = load / (np.pi * scene.bearing.slider_rim_radius(index) ** 2)
+        expected = surface.friction * 0.7 ** ((pressure - surface.reference_pressure) / 50e6)
+        assert made.friction == pytest.approx(expected * (1 - 0.5 * np.exp(-100 * speed)), rel=1e-12)
+    assert constant_friction(scene.bearing, None, load, speed) is scene.bearing
+    motion, times = Motion.harmonic(0.1, 0.5, cycles=2), np.linspace(0.0, 4.0, 40001)
+    slopes = np.gradient(motion.evaluate(times)[:, 0], times)
+    assert peak_speed(motion, 4.0) == pytest.approx(np.abs(slopes).max(), rel=1e-3)
+
+
+def test_cheaper_models_add_rims_and_heat_where_the_scene_lets_them():
+    """A level that fixed the effects of the start would leave out what the exact run takes in on its way."""
+    massless = changed_scene("fenz-test5", {"fidelity": "massless", "effects": {}})
+    assert massless.effects == Auto(sliders="massless", uplift=False)
+    rigid = at_fidelity(load_scene("hospital-clc"), "rigid")
+    assert all(m.effects.sliders == "massless" and not m.effects.uplift for m in rigid.bearings)
+    changes = {"motion.duration": 12.0, "effects": {"bouc_wen": "plastic"}, "fidelity": "massless"}
+    pushed = changed_scene("ridgecrest-ccc", changes)
+    assert pushed.modelled.friction == "pv" and "pvt" in simulate(pushed).provenance["model"]
+
+
+def test_surfaces_of_one_pendulum_are_none_of_the_device(tmp_path):
+    """No verdict, note, table or column is about a surface or a body that the device does not have."""
+    changes = {"motion.duration": 12.0, "fidelity": "equivalent"}
+    run = simulate(changed_scene("ridgecrest-ccc", changes))
+    assert [note.kind for note in run.notes] == ["fidelity"]
+    assert run.verdict.word == "not judged" and not run.verdict.ok and not run.verdict.readings
+    surfaces = {"peak_sliding", "minimum_gap", "rims_met", "friction", "uplift", "peak_temperature"}
+    assert not surfaces & run.summary.keys()
+    assert not any("surface" in "".join(table.columns) for table in (*run.tables(), *run.characterise().tables()))
+    assert not run.characterise().surfaces and "one pendulum is in place of the stack" in run.characterise().notes[-1]
+    limit = 0.9 * run.summary["peak_displacement"]["radial"]
+    limits = {"limits.displacement": limit, "limits.rim_force": 1.0}
+    found = simulate(changed_scene("ridgecrest-ccc", {**changes, **limits}))
+    assert [one.limit.key for one in found.verdict.exceeded] == ["displacement"] and found.verdict.word == "exceeded"
+    read = type(run).from_netcdf(run.to_netcdf(tmp_path / "run.nc"))
+    assert read.verdict.word == "not judged" and read.summary.keys() == run.summary.keys()
+    table = {"scene": "fenz-test2", "keep": ["peak_displacement", "peak_sliding", "capacity_used", "verdict"]}
+    study = load_study({**table, "axes": {"level": {"sets": "fidelity", "values": ["equivalent"]}}})
+    row, _ = study.keep.values(simulate(study.scene(1)), {})
+    assert row["peak_displacement"] > 0.02 and row["verdict"] == "not judged"
+    assert row["peak_sliding_1"] is None and row["capacity_used_1"] is None
 
 
 def test_values_of_the_stack_are_none_of_its_equivalent():
