@@ -15,7 +15,7 @@ from os import getloadavg
 from pathlib import Path
 
 from plain import plain_scene
-from quick import docs_folder, parser, pick
+from quick import docs_folder, labelled, parser, pick
 
 from msfp_gen import RunError, Scene
 from msfp_gen.common.output import replacing
@@ -331,7 +331,7 @@ def page(folder: Path, cases: list[Case], share: float) -> None:
     for name, value in filled.items():
         text = text.replace(f"{{{{{name}}}}}", value)
     with replacing(folder / "accuracy.md") as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(labelled(text), encoding="utf-8")
 
 
 def main(words: list[str]) -> None:

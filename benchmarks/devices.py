@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from quick import docs_folder, parser
+from quick import docs_folder, labelled, parser
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests")]  # the closed form is that of the tests
@@ -229,7 +229,7 @@ def write_table(folder: Path) -> None:
     before, rest = text.split(MARKS[0])
     after = rest.split(MARKS[1])[1]
     with replacing(folder / "devices.md") as temporary:
-        temporary.write_text(before + MARKS[0] + table() + MARKS[1] + after, encoding="utf-8")
+        temporary.write_text(labelled(before + MARKS[0] + table() + MARKS[1] + after), encoding="utf-8")
 
 
 def main(folder: Path) -> None:

@@ -309,8 +309,20 @@ def shaken_mass_of_opensees(radius: float, law: str, *numbers: float, options: S
     return forces
 
 
-# OpenSeesPy 3.7.1 reads the option for vertical displacement with this spelling only; others it passes over in silence.
-LIFTED = "-inclVertdisp"
+def lifting(version: str) -> str:
+    """The option of `singleFPBearing` for vertical displacement as a version of OpenSees spells it.
+
+    Each version reads one spelling only, and passes over the other in silence.
+    """
+    first = tuple(int(number) for number in version.split(".")[:2])
+    return "-inclVertDisp" if first >= (3, 8) else "-inclVertdisp"
+
+
+def acted(plain: Array, lifted: Array, version: str) -> Array:
+    """The forces with an option, shape (k, 2) [N]. Raises AssertionError where it changes nothing."""
+    change = float(np.abs(lifted - plain).max() / np.abs(plain).max())
+    assert change > 1e-6, f"OpenSees {version} passes over {lifting(version)}: forces change by {change:.1e}"
+    return lifted
 
 
 def opensees_shaken() -> Iterator[Series]:
@@ -329,8 +341,10 @@ def opensees_shaken() -> Iterator[Series]:
             top = Top.mass(FLAT_LOAD / 9.81, 1e-3, 0.0)
             history = simulate(Scene(bearing, motion, top, effects, Solver(rtol=1e-5), output_step=0.05)).history
             label = f"mass on a shaken base, R {radius:g} m, {name}"
-            for suffix, options in (("", ()), (", with vertical displacement", (LIFTED,))):
-                reference = shaken_mass_of_opensees(radius, law, *numbers, options=options)
+            version = str(import_module("openseespy.opensees").version())
+            plain = shaken_mass_of_opensees(radius, law, *numbers)
+            lifted = acted(plain, shaken_mass_of_opensees(radius, law, *numbers, options=(lifting(version),)), version)
+            for suffix, reference in (("", plain), (", with vertical displacement", lifted)):
                 for axis in range(2):
                     points = [
                         Point(f"{history.time[i]:.2f} s", reference[50 * i, axis], float(history.top_force[i, axis]))

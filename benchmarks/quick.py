@@ -19,6 +19,7 @@ T = TypeVar("T")
 QUICK = "--quick" in sys.argv[1:]
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 OPTIONS = ["--quick"] * QUICK  # of the scripts that a script starts
+LABEL = "A quick run: few and short runs, and no number or table below is a measurement."
 
 
 def pick(whole: T, little: T) -> T:
@@ -28,11 +29,18 @@ def pick(whole: T, little: T) -> T:
 
 def parser(text: str | None) -> ArgumentParser:
     """A parser with the option `--quick`; the script reads it here, when its settings are made."""
+    if QUICK:
+        print(LABEL, flush=True)
     made = ArgumentParser(description=text, formatter_class=RawDescriptionHelpFormatter)
     made.add_argument(
         "--quick", action="store_true", help="once through, with few and short runs; numbers mean nothing"
     )
     return made
+
+
+def labelled(page: str) -> str:
+    """A page, which says first that it is no measurement where a quick run made it."""
+    return f"{LABEL}\n\n{page}" if QUICK else page
 
 
 @cache
@@ -45,11 +53,11 @@ def docs_folder() -> Path:
     return Path(copytree(DOCS, folder / "docs", ignore=lambda *_: ["site"]))
 
 
-def installed(module: str, part: str) -> bool:
-    """Whether a program that a script compares with can be imported; if not, one line says what is left out."""
+def installed(module: str, part: str, extra: str = "peers") -> bool:
+    """Whether a module of an extra can be imported; if not, one line says what a script leaves out without it."""
     try:
         import_module(module)
     except Exception as error:  # OpenSeesPy raises RuntimeError where a library of the system is missing
-        print(f"left out, since {module} cannot be imported ({error}); pip install -e .[peers]: {part}", flush=True)
+        print(f"left out, since {module} cannot be imported ({error}); pip install -e .[{extra}]: {part}", flush=True)
         return False
     return True

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from drawing import MILLI, Runs, closed_form, closed_push, cycle, ratio
 from inertia_study import GRID, RTOL, SERIES, TESTED, Point, failures, scene
+from quick import labelled
 
 from msfp_gen import simulate
 from msfp_gen.common.output import replacing
@@ -172,4 +173,4 @@ def page(runs: Runs, points: list[Point]) -> str:
 def write(runs: Runs, points: list[Point], path: Path) -> None:
     text = page(runs, points)
     with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(labelled(text), encoding="utf-8")

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from quick import QUICK, docs_folder, installed, parser, pick
+from quick import QUICK, docs_folder, installed, labelled, parser, pick
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests")]  # closed forms are those of the tests
@@ -345,7 +345,7 @@ def main(folder: Path) -> None:
     text = points(rows, found)
     past = history(text)
     with replacing(folder / "validation.md") as temporary:
-        temporary.write_text(page(rows, found, past, text), encoding="utf-8")
+        temporary.write_text(labelled(page(rows, found, past, text)), encoding="utf-8")
     if QUICK:
         return
     with replacing(POINTS) as temporary:

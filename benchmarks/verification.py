@@ -10,10 +10,12 @@ from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 
-from quick import docs_folder, parser, pick
+from quick import QUICK, docs_folder, installed, labelled, parser, pick
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks"), str(ROOT / "tests")]  # the cases are those of the tests
+sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks"), str(ROOT / "tests")]
+if not installed("pytest", "all tables, whose cases are those of the tests", "test"):
+    raise SystemExit(0 if QUICK else 1)
 
 from support.manufactured import Solution, fixed_steps, orders, resolved, solve  # noqa: E402
 from support.manufactured_cases import (  # noqa: E402
@@ -102,7 +104,7 @@ def page() -> str:
 def main(folder: Path) -> None:
     text = page()
     with replacing(folder / "verification.md") as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(labelled(text), encoding="utf-8")
 
 
 if __name__ == "__main__":

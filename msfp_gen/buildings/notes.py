@@ -13,9 +13,10 @@ from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.note import RISING, Note
-from msfp_gen.scene.effect_selection import LEAST_DAMPING, USUAL_DAMPING, doubtful_values, ringing
+from msfp_gen.scene.effect_selection import LEAST_DAMPING, USUAL_DAMPING, doubtful_values, ringing, unread_values
 from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.standing import unsteady
+from msfp_gen.specification.layout import Auto
 
 ENERGY_LIMIT = 0.02  # error of the energy balance of the building over its largest term, above which a note is written
 GATHERED = ("inertia", "heat", "law_speed", "law_load", "law_temperature")  # kinds with one note for all bearings
@@ -36,13 +37,28 @@ def notes_of(scene: BuildingScene, monitored: Sequence[Note], error: float, time
         for number, (mount, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True), start=1)
         for note in value_notes(mount, load)
     ]
-    notes = [*values, *_gathered(monitored)]
+    notes = [*_shared(values), *_gathered(monitored)]
     labelled = [replace(note, text=f"{scene.label(note.bearing - 1)}: {note.text}") for note in notes]
     whole = [Note(0.0, "value", *doubt) for doubt in building_doubts(scene)]
     whole += [Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity])] if scene.fidelity in UNSEEN else []
     if error > ENERGY_LIMIT:
         whole.append(Note(time, "energy", 0, error, ENERGY.format(value=error)))
     return tuple(sorted([*labelled, *whole], key=lambda note: note.time))
+
+
+def _shared(notes: Sequence[Note]) -> list[Note]:
+    """The notes on values, with one note, of the first bearing, for all that have the same doubtful value."""
+    alike: dict[str, list[Note]] = {}
+    for note in notes:
+        alike.setdefault(note.text.partition(":")[0], []).append(note)
+    return [_with_others(group[0], group) for group in alike.values()]
+
+
+def _with_others(note: Note, alike: Sequence[Note], addition: str = "") -> Note:
+    """The note, with the number of other bearings of which there is such a note."""
+    others = len({other.bearing for other in alike}) - 1
+    words = f"; the same holds for {others} other bearing{'s' * (others > 1)}{addition}"
+    return replace(note, text=note.text + (words if others else ""))
 
 
 def _gathered(notes: Sequence[Note]) -> list[Note]:
@@ -54,11 +70,7 @@ def _gathered(notes: Sequence[Note]) -> list[Note]:
     for kind in GATHERED:
         alike = [note for note in notes if note.kind == kind and not note.action]
         alike.sort(key=lambda note: -note.value if note.kind in RISING else note.time)
-        for note in alike[:1]:
-            others = len({other.bearing for other in alike}) - 1
-            words = f"; the same holds for {others} other bearing{'s' * (others > 1)}"
-            words += ", with less" if kind in RISING else ""
-            gathered.append(replace(note, text=note.text + (words if others else "")))
+        gathered += [_with_others(note, alike, ", with less" if kind in RISING else "") for note in alike[:1]]
         gathered += [note for note in notes if note.kind == kind and note.action]
     return gathered
 
@@ -66,7 +78,11 @@ def _gathered(notes: Sequence[Note]) -> list[Note]:
 def value_notes(mount: BuildingBearing, load: float) -> tuple[Note, ...]:
     """Notes about doubtful values of a bearing and its interface. load: at rest [N]."""
     stiffness, needed, _ = standing_below(mount, load)
-    doubts = (*doubtful_values(mount.bearing, load), *unsteady("interface.rotational_stiffness", stiffness, needed))
+    doubts = (
+        *doubtful_values(mount.bearing, load),
+        *unread_values(mount.bearing, mount.effects or Auto()),
+        *unsteady("interface.rotational_stiffness", stiffness, needed),
+    )
     return tuple(Note(0.0, "value", *doubt) for doubt in doubts)
 
 

@@ -15,6 +15,7 @@ from support.synthetic import loops as loops_of_one
 from support.synthetic import opened
 
 from msfp_gen import Effects, InputError, RunError, Solver, characterise, simulate
+from msfp_gen.buildings.notes import _shared
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import plot_loops, plot_orbit, plot_result, plot_sliding
 from msfp_gen.results.characterise import characterised, csv_rows
@@ -319,3 +320,13 @@ def test_every_quantity_of_the_catalogue_is_in_a_pushed():
         # no friction law, no uplift; and both runs end in motion
         optional = {"least_friction", "most_friction", "peak_temperature", "maximum_uplift", "residual_displacement"}
         assert missing <= optional and values["peak_force"] == characterisation.peak_force
+
+
+def test_a_doubt_about_a_shared_bearing_is_one_note() -> None:
+    """Seventy bearings of one kind under different loads: one note, as one of each other value."""
+    doubt = "bearing.surfaces[0].rim_stiffness = 300 N/m stops no slider: the load at rest is {} N"
+    values = [Note(0.0, "value", 1, 300.0, doubt.format(1e6 + k), bearing=k) for k in range(1, 71)]
+    other = Note(0.0, "value", 2, 0.5, "bearing.surfaces[1].friction = 0.5 is unusually high", bearing=3)
+    first, second = _shared([*values, other])
+    assert first.text == doubt.format(1e6 + 1) + "; the same holds for 69 other bearings" and first.bearing == 1
+    assert second == other
