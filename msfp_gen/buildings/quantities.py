@@ -7,10 +7,10 @@ from msfp_gen.results.quantities import RUN, Quantity, Source, sources_of
 
 _RUN = RUN | {"rims_met": RUN["rims_met"]._replace(kept=False)}
 QUANTITIES = _RUN | {
-    "peak_base_torsion": Quantity("N m", "peak_base_torsion"),
+    "peak_base_torsion": Quantity("N m", "peak_base_torsion", extreme="most"),
     "peak_overturning_moment": Quantity("N m", "peak_overturning_moment.radial", "most"),
     "peak_floor_acceleration": Quantity("m/s^2", "peak_floor_acceleration.radial", "most", kept=True),
-    "peak_vertical_acceleration": Quantity("m/s^2", "peak_floor_acceleration.E3"),
+    "peak_vertical_acceleration": Quantity("m/s^2", "peak_floor_acceleration.E3", extreme="most"),
     "peak_drift_ratio": Quantity("", "peak_drift_ratio", "most", kept=True),
     "peak_corner_drift_ratio": Quantity("", "peak_corner_drift_ratio", "most"),
     "minimum_load_ratio": Quantity("", "minimum_load_ratio", "least", kept=True),

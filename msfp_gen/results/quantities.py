@@ -8,6 +8,8 @@ from typing import Any, Literal, NamedTuple
 
 from msfp_gen.scene.scene import Scene
 
+Side = Literal["most", "least", ""]
+
 
 class Quantity(NamedTuple):
     """A quantity of a run.
@@ -16,34 +18,43 @@ class Quantity(NamedTuple):
     surface, floor, storey or bearing, bottom first or in the order of the file, and gives one column for each. governs:
     whether the largest or the least value governs a design; "" if neither does. at_rest: whether the quantity is
     defined only if the run ends at rest. of_parts: whether it is of parts of a building, which suites compare and
-    bounds do not. kept: whether a study keeps it where its file names no quantities.
+    bounds do not. kept: whether a study keeps it where its file names no quantities. extreme: whether it is the largest
+    or the least value over the run; None: as `governs`.
     """
 
     unit: str
     path: str
-    governs: Literal["most", "least", ""] = ""
+    governs: Side = ""
     characterised: bool = False
     at_rest: bool = False
     of_parts: bool = False
     kept: bool = False
+    extreme: Side | None = None
+
+    @property
+    def side(self) -> Side:
+        """How a run that ended early bounds the value: "most" from below, "least" from above, "" not at all."""
+        return self.governs if self.extreme is None else self.extreme
 
 
 RUN = {
     "status": Quantity("", "status"),
     "message": Quantity("", "message"),
-    "duration": Quantity("s", "duration"),
+    "duration": Quantity("s", "duration", extreme="most"),
     "peak_displacement": Quantity("m", "peak_displacement.radial", "most", kept=True),
     "peak_force": Quantity("N", "peak_force.radial", "most", kept=True),
-    "peak_force_ratio": Quantity("", "peak_force_ratio"),
+    "peak_force_ratio": Quantity("", "peak_force_ratio", extreme="most"),
     "rims_met": Quantity("", "rims_met", kept=True),
     "verdict": Quantity("", "verdict.word"),
     "limits_exceeded": Quantity("", "verdict.limits", kept=True),
     "closure_error": Quantity("", "energy.closure_error"),
-    "steps": Quantity("", "counters.steps"),
+    "steps": Quantity("", "counters.steps", extreme="most"),
     "wall_time": Quantity("s", "wall_time"),
     "secant_stiffness": Quantity("N/m", "secant_stiffness", characterised=True),
-    "energy_dissipated": Quantity("J", "energy_dissipated", characterised=True),
-    "residual_displacement": Quantity("m", "residual_displacement", "most", characterised=True, at_rest=True),
+    "energy_dissipated": Quantity("J", "energy_dissipated", characterised=True, extreme="most"),
+    "residual_displacement": Quantity(
+        "m", "residual_displacement", "most", characterised=True, at_rest=True, extreme=""
+    ),
     # means over the cycles
     "effective_stiffness": Quantity("N/m", "envelope.effective_stiffness.mean", characterised=True),
     "effective_period": Quantity("s", "envelope.effective_period.mean", characterised=True),
@@ -52,19 +63,19 @@ RUN = {
 }
 BEARING = RUN | {
     "axial_load": Quantity("N", "axial_load"),
-    "peak_input_energy": Quantity("J", "energy.peak_input"),
+    "peak_input_energy": Quantity("J", "energy.peak_input", extreme="most"),
     "dissipated_share": Quantity("", "energy.dissipated_share"),
-    "capacity_used": Quantity("", "capacity_used.*"),  # 1 where a slider meets its rim
-    "peak_sliding": Quantity("m", "peak_sliding.*", kept=True),
-    "minimum_gap": Quantity("m", "minimum_gap.*"),
-    "minimum_normal_force": Quantity("N", "minimum_normal_force.*"),
-    "maximum_normal_force": Quantity("N", "maximum_normal_force.*"),
-    "least_friction": Quantity("", "least_friction.*"),
-    "most_friction": Quantity("", "most_friction.*"),
-    "peak_temperature": Quantity("degC", "peak_temperature.*"),
-    "peak_rim_force": Quantity("N", "peak_rim_force.*"),
-    "uplift_height": Quantity("m", "uplift.height"),
-    "uplift_duration": Quantity("s", "uplift.duration"),
+    "capacity_used": Quantity("", "capacity_used.*", extreme="most"),  # 1 where a slider meets its rim
+    "peak_sliding": Quantity("m", "peak_sliding.*", kept=True, extreme="most"),
+    "minimum_gap": Quantity("m", "minimum_gap.*", extreme="least"),
+    "minimum_normal_force": Quantity("N", "minimum_normal_force.*", extreme="least"),
+    "maximum_normal_force": Quantity("N", "maximum_normal_force.*", extreme="most"),
+    "least_friction": Quantity("", "least_friction.*", extreme="least"),
+    "most_friction": Quantity("", "most_friction.*", extreme="most"),
+    "peak_temperature": Quantity("degC", "peak_temperature.*", extreme="most"),
+    "peak_rim_force": Quantity("N", "peak_rim_force.*", extreme="most"),
+    "uplift_height": Quantity("m", "uplift.height", extreme="most"),
+    "uplift_duration": Quantity("s", "uplift.duration", extreme="most"),
     "maximum_uplift": Quantity("m", "maximum_uplift", "most", characterised=True),
     "capacity_left": Quantity("m", "surfaces.*.capacity_left", "least", characterised=True),
     "peak_velocity": Quantity("m/s", "surfaces.*.peak_velocity", "most", characterised=True),

@@ -9,17 +9,18 @@ from __future__ import annotations
 import ast
 import json
 import math
+import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.files import Storage
-from msfp_gen.results.quantities import Source
+from msfp_gen.results.quantities import Side, Source
 from msfp_gen.results.variables import Arrays, Places
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.specification import formula
@@ -53,6 +54,54 @@ def usual_names(sources: Mapping[str, Source]) -> tuple[str, ...]:
         if source.quantity.kept
     ]
     return tuple(dict.fromkeys(kept))
+
+
+FLIPPED: dict[Side, Side] = {"most": "least", "least": "most", "": ""}
+_SIDES: dict[str, Side] = {"peak": "most", "most": "most", "least": "least", "last": ""}  # of `EXTREMES`
+_Sided = Side | float  # in a formula: the side of a value that a longer run changes, or a number
+
+
+def _both(combine: Callable[[float, float], float], a: _Sided, b: _Sided) -> _Sided:
+    """The side of what grows with both values, such as their sum."""
+    if isinstance(a, float) and isinstance(b, float):
+        return combine(a, b)
+    sides = {x for x in (a, b) if not isinstance(x, float)}
+    return sides.pop() if len(sides) == 1 else ""
+
+
+def _negative(a: _Sided) -> _Sided:
+    return -a if isinstance(a, float) else FLIPPED[a]
+
+
+def _times(a: _Sided, b: _Sided) -> _Sided:
+    """The side of a product, which is known where one of the two is a number."""
+    if isinstance(a, float):
+        a, b = b, a
+    if isinstance(a, float) and isinstance(b, float):
+        return a * b
+    return "" if not isinstance(b, float) or b == 0 else a if b > 0 else _negative(a)
+
+
+def _rising(function: Callable[[float], float]) -> Callable[[_Sided], _Sided]:
+    return lambda a: function(a) if isinstance(a, float) else a
+
+
+def _unsided(function: Callable[..., float]) -> Callable[..., _Sided]:
+    return lambda *values: function(*values) if all(isinstance(value, float) for value in values) else ""
+
+
+# Operations of a formula on sides.
+_OF_SIDES: formula.Operations = {
+    "number": float,
+    "neg": _negative,
+    "add": partial(_both, operator.add),
+    "sub": lambda a, b: _both(operator.add, a, _negative(b)),
+    "mul": _times,
+    "div": lambda a, b: _times(a, 1 / b) if isinstance(b, float) and b else "",
+    **{name: partial(_both, function) for name, function in (("Min", min), ("Max", max))},
+    **{name: _rising(getattr(math, name)) for name in ("exp", "log", "sqrt", "tanh")},
+    **{name: _unsided(function) for name, function in (("pow", math.pow), ("power", math.pow), ("Abs", abs))},
+}
 
 
 class Column(NamedTuple):
@@ -107,6 +156,21 @@ class Keep:
     def numbers(self) -> list[str]:
         """Names of the columns that hold numbers."""
         return [column.name for column in self.columns if not column.text]
+
+    def side(self, name: str) -> Side:
+        """How a run that ended early bounds a column, as `Quantity.side`; a formula by the sides of what is in it."""
+        text = dict(self.formulas).get(name)
+        if text is None:
+            return self.known[name].quantity.side
+        tree, extremes = _tree(self, name, text)
+        symbols: dict[str, _Sided] = {symbol: _SIDES[word] for symbol, (word, _) in extremes.items()}
+        for symbol in formula.names_in(tree) - symbols.keys():
+            symbols[symbol] = self.known[symbol].quantity.side if symbol in self.known else ""
+        try:
+            found = formula.fold(tree, symbols, _OF_SIDES)
+        except (ArithmeticError, ValueError):  # of numbers that have no value
+            return ""
+        return "" if isinstance(found, float) else found
 
     def values(self, result: Any, at: Mapping[str, float]) -> tuple[dict[str, Any], str]:
         """Column -> value, None where undefined; and a line that says why there is no characterisation, "" if there is.

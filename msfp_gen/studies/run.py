@@ -7,6 +7,7 @@ contains a digest of everything that determines its rows. So the parts in the fo
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import time
@@ -235,7 +236,9 @@ def _part(order: Order, rows: list[dict[str, Any]], failed: int, more: dict[str,
     columns = [*axes, *texts, *intensity, *order.keep.columns]
     types = {"run": "int64", **{name: "string" if text else "double" for name, _, text in columns}}
     values = {(name, unit): [row.get(name) for row in rows] for name, unit, _ in (Column("run", ""), *columns)}
-    return parquet_bytes(values, types, {"digest": order.digest, "failed": str(failed), **more})
+    sides = {name: order.keep.side(name) for name in order.keep.numbers}
+    about = {"digest": order.digest, "failed": str(failed), "sides": json.dumps(sides), **more}
+    return parquet_bytes(values, types, about)
 
 
 class Chunks:

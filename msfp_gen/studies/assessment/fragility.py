@@ -19,6 +19,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Choice
 from msfp_gen.common.tables import Table
 from msfp_gen.figures.style import COLOURS, headline, page, plain
+from msfp_gen.results.quantities import Side
 from msfp_gen.scene.file.catalogue import parsed
 from msfp_gen.studies.assessment.rows import (
     SIZE,
@@ -29,6 +30,7 @@ from msfp_gen.studies.assessment.rows import (
     intensities,
     labelled,
     scale_of,
+    side_of,
     unit_of,
 )
 
@@ -39,7 +41,7 @@ ITERATIONS = 100
 CONVERGED = 1e-10  # Newton decrement at which the fit ends
 EARLY = {
     "leave-out": "left out, and counted",
-    "exceed": "count as runs above the threshold",
+    "exceed": "count as runs that exceed the threshold",
     "refuse": "an error",
 }
 LEAST_BOOTSTRAPS = 100
@@ -250,8 +252,10 @@ def fragility(
 ) -> Fragility:
     """Fragility curves by maximum likelihood, one for each threshold of the demand.
 
-    A run exceeds a threshold if its demand is at least the threshold. The demand of a run that ended early is a lower
-    bound: the run exceeds every threshold up to it, and `early` states how it counts for higher thresholds.
+    A run exceeds a threshold if its demand is at least the threshold; of a demand that is the least value over a run,
+    such as a gap, if it is at most the threshold. The demand of a run that ended early is a bound: the run exceeds
+    every threshold up to it, or from it on, and `early` states how it counts for the others. It is no bound of a demand
+    that is no extreme over the run, such as a residual displacement.
 
     rows: DataFrame of `read_study`, or a part of it. measure, demand: columns of the intensity measure, such as
     `scale`, and of the demand. thresholds: damage states. early: a key of EARLY. level: of confidence of intervals and
@@ -271,7 +275,7 @@ def fragility(
         x, y, ended = intensities(case_rows, measure), demands(case_rows, demand), complete(case_rows)
         groups = _groups(case_rows, cluster, bootstrap)
         for threshold in sorted(thresholds):
-            exceeded, known = _exceedance(y, ended, threshold, early, demand)
+            exceeded, known = _exceedance(y, ended, threshold, early, demand, side_of(rows, demand))
             resampling = None if groups is None else (groups[known], bootstrap, seed)
             where = f"threshold {threshold:g} of {demand}" + (f", {by} = {case}" if by else "")
             state = _state(x[known], exceeded[known], threshold, int((~known).sum()), level, resampling, where)
@@ -302,14 +306,15 @@ def _groups(rows: Any, cluster: str, bootstrap: int) -> Any:
     return groups
 
 
-def _exceedance(y: Array, ended: Any, threshold: float, early: str, demand: str) -> tuple[Any, Any]:
+def _exceedance(y: Array, ended: Any, threshold: float, early: str, demand: str, side: Side) -> tuple[Any, Any]:
     """Whether each run exceeds the threshold, and whether this is known, both shape (runs,). Raises InputError."""
-    exceeded = y >= threshold
-    unknown = ~ended & ~exceeded
+    exceeded = y <= threshold if side == "least" else y >= threshold
+    unknown = ~ended & ~exceeded if side else ~ended
     if early == "refuse" and unknown.any():
+        where = {"most": "below", "least": "above", "": "and do not bound"}[side]
         raise InputError(
-            f"{int(unknown.sum())} runs ended early below {demand} = {threshold:g}; see their status and message, and "
-            "give early = 'leave-out' or 'exceed'"
+            f"{int(unknown.sum())} runs ended early {where} {demand} = {threshold:g}; see their status and message, "
+            "and give early = 'leave-out' or 'exceed'"
         )
     if early == "exceed":
         return exceeded | unknown, np.ones_like(unknown)

@@ -17,6 +17,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
 from msfp_gen.figures.style import COLOURS, FAINT, INK, THIN, headline, page
+from msfp_gen.results.quantities import Side
 from msfp_gen.studies.assessment.rows import (
     SIZE,
     check_columns,
@@ -25,6 +26,7 @@ from msfp_gen.studies.assessment.rows import (
     intensities,
     labelled,
     scale_of,
+    side_of,
     unit_of,
 )
 from msfp_gen.studies.axes import INTENSITY
@@ -49,7 +51,9 @@ class Ida:
         curves: DataFrame, one row for each run, sorted by curve and intensity: `curve`, the measure, the demand, and
             `ended`, false for a run that ended early, whose demand is a lower bound.
         fractiles: DataFrame, one row for each intensity: the measure, `curves`, `ended_early`, and one column for each
-            fractile, such as `p50`; infinite where the fractile lies among runs that ended early.
+            fractile, such as `p50`; infinite where the fractile lies among runs that ended early, of a least value
+            minus infinity.
+        side: as of `side_of`.
     """
 
     measure: str
@@ -58,6 +62,7 @@ class Ida:
     unit: str
     curves: Any
     fractiles: Any
+    side: Side = "most"
 
     @property
     def shares(self) -> list[str]:
@@ -69,20 +74,28 @@ def ida(rows: Any, measure: str, demand: str, fractiles: Sequence[float] = FRACT
     """IDA curves, and the fractiles of the demand at each intensity.
 
     The runs of a curve differ in their intensity only; there is one curve for each record, sample and bound. A run that
-    ended early counts as a demand above all others, and so does every larger intensity of its curve. The fractile p of
+    ended early counts as a demand above all others, of a demand that is the least value over a run below all others,
+    and so does every larger intensity of its curve. The fractile p of
     n curves is the smallest demand that at least p n curves do not exceed; where p n is a whole number, it is the mean
     of this demand and the next larger demand, so that the median of an even number of curves is the mean of the middle
     two. Where the curves have different intensities, such as spectral accelerations, demands are interpolated, from
-    zero at zero.
+    zero at zero; of least values, which are not zero there, from the first intensity that all curves have.
 
     rows: DataFrame of `read_study`, or a part of it. measure: column of the intensity measure, such as `scale` or
     `intensity`. demand: column of the demand, such as `peak_displacement`. fractiles: shares between 0 and 1. Raises
-    InputError: unknown columns, intensities that are not positive, curves of a single intensity, or invalid fractiles.
+    InputError: unknown columns, intensities that are not positive, curves of a single intensity, invalid fractiles, or
+    runs that ended early where the demand is no extreme over a run.
     """
     import pandas as pd
 
     if not fractiles or not all(0 < share < 1 for share in fractiles):
         raise InputError(f"fractiles = {list(fractiles)}: give shares between 0 and 1, such as 0.16")
+    side, early = side_of(rows, demand), int((~complete(rows)).sum())
+    if early and not side:
+        raise InputError(
+            f"{demand}: {early} runs ended early, and it is neither the largest nor the least value over a run, so "
+            "that they say nothing about it; give --where status=ok to leave them out"
+        )
     columns = {measure: intensities(rows, measure), demand: demands(rows, demand), "ended": complete(rows)}
     frame = pd.DataFrame({"curve": _curve_numbers(rows, measure), **columns})
     frame = frame.sort_values(["curve", measure], ignore_index=True)
@@ -90,12 +103,12 @@ def ida(rows: Any, measure: str, demand: str, fractiles: Sequence[float] = FRACT
     if sizes.min() < 2:
         raise InputError(f"{measure}: an IDA needs several intensities of each record; curve {sizes.idxmin()} has one")
     curves = [(c[measure].to_numpy(), c[demand].to_numpy(), c["ended"].to_numpy()) for _, c in frame.groupby("curve")]
-    levels = _common_intensities(curves)
-    values = np.sort([_interpolated(levels, *curve) for curve in curves], axis=0)
+    levels = _common_intensities(curves, side)
+    values = np.sort([_interpolated(levels, *curve, side) for curve in curves], axis=0)
     table = {measure: levels, "curves": len(curves), "ended_early": np.isinf(values).sum(axis=0)}
     for share in fractiles:
         table[f"p{100 * share:g}"] = _fractile(values, share)
-    return Ida(measure, demand, unit_of(rows, measure), unit_of(rows, demand), frame, pd.DataFrame(table))
+    return Ida(measure, demand, unit_of(rows, measure), unit_of(rows, demand), frame, pd.DataFrame(table), side)
 
 
 def _fractile(values: Array, share: float) -> Array:
@@ -107,7 +120,7 @@ def _fractile(values: Array, share: float) -> Array:
     return np.asarray(values[ceil(count) - 1])
 
 
-def _common_intensities(curves: list[Curve]) -> Array:
+def _common_intensities(curves: list[Curve], side: Side) -> Array:
     """The intensities of the fractiles: of the curves if equal in all, else a grid to the end of the shortest curve.
 
     A curve with a run that ended early counts as longer than any other.
@@ -116,19 +129,23 @@ def _common_intensities(curves: list[Curve]) -> Array:
     if all(np.array_equal(np.unique(x), first) for x, _, _ in curves):
         return first
     limit = min((x[-1] for x, _, ended in curves if ended.all()), default=max(x[-1] for x, _, _ in curves))
+    if side != "most":
+        return np.linspace(max(x[0] for x, _, _ in curves), limit, POINTS)
     return np.linspace(0, limit, POINTS + 1)[1:]
 
 
-def _interpolated(levels: Array, x: Array, y: Array, ended: Any) -> Array:
+def _interpolated(levels: Array, x: Array, y: Array, ended: Any, side: Side) -> Array:
     """The demand of a curve at intensities `levels`, linear between its runs, shape of `levels`.
 
-    Infinite beyond the last run before the first run that ended early.
+    Infinite beyond the last run before the first run that ended early, of a least value minus infinity.
     """
+    beyond = -np.inf if side == "least" else np.inf
     first_early = x[~ended].min(initial=np.inf)
     known = ended & (x < first_early)
-    values = np.interp(levels, [0.0, *x[known]], [0.0, *y[known]])
+    origin = [0.0] if side == "most" or not known.any() else []
+    values = np.interp(levels, [*origin, *x[known]], [*origin, *y[known]])
     last = x[known].max(initial=0.0)
-    return np.where((levels > last) & np.isfinite(first_early), np.inf, values)
+    return np.where((levels > last) & np.isfinite(first_early), beyond, values)
 
 
 def _curve_numbers(rows: Any, measure: str) -> Any:
@@ -158,6 +175,7 @@ def ida_table(result: Ida) -> Table:
 def plot_ida(result: Ida, path: str | Path | None = None, title: str = "") -> Figure:
     """Intensity over demand: every curve, with a cross where a run ended early, and fractiles. path: as of `page`."""
     scale = scale_of(result.curves[result.demand], result.unit)
+    origin = [0.0] if result.side == "most" else []
     with page(*SIZE, path) as figure:
         headline(figure, title or "incremental dynamic analysis")
         axes = figure.subplots()
@@ -165,13 +183,15 @@ def plot_ida(result: Ida, path: str | Path | None = None, title: str = "") -> Fi
             if number > MOST_CURVES:
                 break
             x, y = curve[result.measure], scale.factor * curve[result.demand]
-            axes.plot([0.0, *y], [0.0, *x], color=FAINT, linewidth=THIN / 2, alpha=0.6)
+            axes.plot([*origin, *y], [*origin, *x], color=FAINT, linewidth=THIN / 2, alpha=0.6)
             early = ~curve["ended"]
             axes.plot(y[early][:1], x[early][:1], "x", color=FAINT, markersize=4)
         for name, colour in zip(result.shares, (COLOURS[0], INK, COLOURS[1], *COLOURS[2:]), strict=False):
             values = np.where(np.isinf(result.fractiles[name]), np.nan, scale.factor * result.fractiles[name])
-            axes.plot([0.0, *values], [0.0, *result.fractiles[result.measure]], color=colour, label=f"{name[1:]} %")
+            axes.plot(
+                [*origin, *values], [*origin, *result.fractiles[result.measure]], color=colour, label=f"{name[1:]} %"
+            )
         axes.set(xlabel=labelled(result.demand, scale.unit), ylabel=labelled(result.measure, result.measure_unit))
-        axes.set(xlim=(0, None), ylim=(0, None))
+        axes.set(xlim=(0 if origin else None, None), ylim=(0, None))
         axes.legend(title="fractile of demand")
     return figure

@@ -5,6 +5,7 @@ The parts in the folder of a study come in; every evaluation of a study begins w
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import write_columns
 from msfp_gen.figures.style import Scale, engineering
+from msfp_gen.results.quantities import Side
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.studies.run import parts_in, readable_parts, study_table
 
@@ -31,9 +33,9 @@ STATISTICS: dict[str, Callable[..., Any]] = {
 def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
     """The rows that a study has so far, as a pandas.DataFrame, sorted by run.
 
-    columns: to be read beside `run` and `status`; None: all. `DataFrame.attrs["units"]` has the units, and
-    `attrs["chosen"]` states whether an estimate chose the runs. Raises InputError: the folder has no study, the study
-    has no rows yet, or a column is unknown.
+    columns: to be read beside `run` and `status`; None: all. `DataFrame.attrs["units"]` has the units, `attrs["sides"]`
+    how runs that ended early bound a column, and `attrs["chosen"]` states whether an estimate chose the runs. Raises
+    InputError: the folder has no study, the study has no rows yet, or a column is unknown.
     """
     import pyarrow.dataset as ds
 
@@ -50,6 +52,7 @@ def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
     with readable_parts(folder):
         rows = dataset.to_table(columns=names).to_pandas().sort_values("run", ignore_index=True)
     rows.attrs["chosen"] = "listed" in table.get("accuracy", {})
+    rows.attrs["sides"] = json.loads((dataset.schema.metadata or {}).get(b"sides", b"{}"))
     rows.attrs["units"] = {field.name: (field.metadata or {}).get(b"units", b"").decode() for field in dataset.schema}
     return rows
 
@@ -114,7 +117,9 @@ def intensities(rows: Any, name: str) -> Array:
 
 
 def demands(rows: Any, name: str) -> Array:
-    """A column as demands, shape (runs,) [its unit]; for a run that ended early a lower bound, 0 without a value.
+    """A column as demands, shape (runs,) [its unit].
+
+    For a run that ended early it is a bound, on the side of `side_of`; without a value 0, or infinite from above.
 
     Raises InputError where a run that reached its end has no value, and for runs that an estimate chose.
     """
@@ -126,7 +131,16 @@ def demands(rows: Any, name: str) -> Array:
     values = numbers(rows, name)
     if count := int(np.isnan(values[complete(rows)]).sum()):
         raise InputError(f"{name}: {count} runs reached their end without a value; give another quantity")
-    return np.where(np.isnan(values), 0.0, values)
+    return np.where(np.isnan(values), np.inf if side_of(rows, name) == "least" else 0.0, values)
+
+
+def side_of(rows: Any, name: str) -> Side:
+    """How runs that ended early bound a column: "most" from below, "least" from above, "" not at all.
+
+    Columns that no study has written are taken for largest values.
+    """
+    side: Side = rows.attrs.get("sides", {}).get(name, "most")
+    return side
 
 
 def complete(rows: Any) -> Any:

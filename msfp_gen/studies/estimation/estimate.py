@@ -56,6 +56,7 @@ STATISTICS = {
     "fragility": "the median scale or intensity at which the quantity reaches `threshold`, and its dispersion",
 }
 LEVELS = {"backbone": 1, "equivalent": 2, "rigid": 3, "massless": 3, "loose": 3}  # cheaper model -> rank, cheapest 1
+BOUNDS = {"most": "a lower bound", "least": "an upper bound", "": ""}  # `Quantity.side` -> of a run that ended early
 ENOUGH = 0.25  # work of a chain over plain Monte Carlo below which no dearer model is tried
 NO_BENEFIT = 0.8  # work of a chain over plain Monte Carlo above which only exact runs are made
 ROUNDS = 8
@@ -78,7 +79,8 @@ class Question:
     the quantity], or the share of a quantile [-]. target: half the width of the interval of 95 %, over the value; for a
     probability not over the value. budget: core time of all runs [s]. pilot: exact runs at the start. models: cheaper
     models to try; None: `estimate` chooses them. seed: of the draws. logarithmic: whether the values are logarithms,
-    for which the target is not over the value. Raises InputError.
+    for which the target is not over the value. side: how runs that ended early bound the quantity, as `Quantity.side`.
+    Raises InputError.
     """
 
     quantity: str | None = None
@@ -90,6 +92,7 @@ class Question:
     models: tuple[str, ...] | None = None
     seed: Annotated[int, Quantity("", least=0, whole=True)] = 0
     logarithmic: bool = field(default=False, repr=False)
+    side: str = field(default="most", repr=False)
 
     def __post_init__(self) -> None:
         check_fields(self, "accuracy")
@@ -178,7 +181,7 @@ def half_of(interval: tuple[float, float]) -> float:
 def question_of(study: Study, **changes: Any) -> Question:
     """The question of `[accuracy]` in a study file; changes other than None replace its keys. Raises InputError."""
     table = {key: value for key, value in study.table.get("accuracy", {}).items() if key != "listed"}
-    known = [name for name in Question.__dataclass_fields__ if name != "logarithmic"]
+    known = [name for name in Question.__dataclass_fields__ if name not in ("logarithmic", "side")]
     if unknown := [key for key in table if key not in known]:
         raise InputError(f"accuracy.{unknown[0]}: no such key; the keys are {', '.join(known)}")
     goals = ("target", "budget")
@@ -246,10 +249,11 @@ def estimate(
     try:
         with pool_from(workers, threads, executor, dask) as pool:
             runs = StudySource(study, Path(folder), question.quantity, levels, question.seed, pool, progress)
+            sided = replace(question, side=study.keep.side(question.quantity))
             if scales is not None:
                 result = fragility_of(runs, question, scales, lambda draws: np.log(runs.draws.intensity(draws)))
             else:
-                result = estimated(runs, question)
+                result = estimated(runs, sided)
                 unit = {column.name: column.unit for column in study.keep.columns}[question.quantity]
                 unit = {"probability": "", "variance": f"({unit})^2" if unit else ""}.get(question.statistic, unit)
     except _BudgetError:
@@ -304,12 +308,22 @@ class _State:
     def outcomes(self, level: str, draws: Indices) -> Array:
         """The values of a model at draws, shape (draws,) [unit of the quantity].
 
-        For a probability or a quantile, a run that ended early is infinite unless it exceeded the threshold before.
+        For a probability or a quantile, a run that ended early is infinite unless it exceeded the threshold before; of
+        a least value it is minus infinity unless it was below the threshold before. Raises InputError where it is no
+        bound.
         """
         values, early = self.source.values(level, draws)
         self.early[level] = int(early.sum())
         if self.question.needs_probability:
             bound = self.question.given_threshold if self.question.statistic == "probability" else np.inf
+            if self.question.side == "least":
+                return np.where(early & ~(values < bound), -np.inf, values)
+            if early.any() and not self.question.side:
+                raise InputError(
+                    f"quantity = {self.question.quantity!r}: {int(early.sum())} runs of {level} ended early, and it is "
+                    "neither the largest nor the least value over a run, so that they say nothing about it; give "
+                    "another quantity"
+                )
             return np.where(early & (values < bound), np.inf, values)
         if level == EXACT and np.isinf(values).any():
             raise InputError(
@@ -390,9 +404,11 @@ def _estimate_and_runs(source: Source, question: Question) -> tuple[Estimate, li
         notes.append(f"the runs took {spent:.3g} s in place of {question.budget:g} s: a pilot needs that; give fewer")
     for level, count in state.early.items():
         if count and question.needs_probability:
-            notes.append(f"{count} runs of {level} ended early; they count as above every value")
+            where = "below" if question.side == "least" else "above"
+            notes.append(f"{count} runs of {level} ended early; they count as {where} every value")
         elif count:
-            word = "a lower bound" if level == EXACT else "what they reached"
+            bound = BOUNDS[question.side] if level == EXACT else ""
+            word = bound or "what they reached"
             notes.append(f"{count} of {runs.get(level, count)} runs of {level} ended early; their value is {word}")
     plain = _plain_variance(question, levels, answer)
     seconds = costs[EXACT] * plain * quantile_of_t(np.inf) ** 2 / half**2 if half > 0 else spent

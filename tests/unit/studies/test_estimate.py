@@ -213,6 +213,16 @@ def test_runs_that_end_early_count_as_above():
     assert all("ended early" in " ".join(found.notes) for found in every if found.value > 0)
 
 
+def test_runs_that_end_early_count_as_below_where_the_least_is_the_worst():
+    """A tenth of all runs fails: all others are above a bound that nearly all exceed."""
+    question = Question("q", "probability", 1e-3, target=0.02, side="least")
+    found = estimated(Lognormal(3, fails=0.1), question)
+    assert found.value == pytest.approx(0.9, abs=0.03)
+    assert "count as below every value" in " ".join(found.notes)
+    with pytest.raises(InputError, match="ended early, and it is neither the largest nor the least value"):
+        estimated(Lognormal(3, fails=0.1), replace(question, side=""))
+
+
 def test_a_budget_that_does_not_permit_the_target_is_one_line():
     with pytest.raises(InputError, match="budget = 40 s: give a target of") as error:
         estimated(Lognormal(), Question("q", target=1e-4, budget=40.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,9 @@ from support.study_tables import cheap_study
 import msfp_gen
 from msfp_gen import InputError
 from msfp_gen.cli import main
-from msfp_gen.studies import fragility, ida, read_study, tornado
+from msfp_gen.studies import fragility, ida, load_study, plot_ida, read_study, tornado
 from msfp_gen.studies.assessment.fragility import fragility_frame
-from msfp_gen.studies.assessment.rows import chosen_rows
+from msfp_gen.studies.assessment.rows import chosen_rows, side_of
 
 LEVELS = np.array([0.25, 0.5, 0.75, 1.0, 1.5, 2.0])
 
@@ -148,6 +149,90 @@ def test_runs_that_ended_early_exceed_what_they_reached() -> None:
     assert fragility(cut, "scale", "demand", [1.5], early="exceed").states[0].exceeded == unknown
     cut.loc[0, "status"] = "newton"  # at a demand below the threshold
     assert fragility(cut, "scale", "demand", [1.0]).states[0].left_out == 1
+
+
+def gaps(count: int = 60) -> pd.DataFrame:
+    """A gap that falls with the scale, 1 - x/capacity; runs end where it is closed, some with a gap that was left."""
+    rng = np.random.default_rng(7)
+    x = np.tile(LEVELS, count)
+    capacity = 1.1 * np.exp(0.4 * rng.standard_normal(len(x)))
+    gap = 1.0 - x / capacity
+    ended = gap < 0
+    left = np.where(ended, np.where(rng.random(len(x)) < 0.5, 0.0, 0.3), gap)
+    record = np.repeat([f"r{k}" for k in range(count)], len(LEVELS))
+    rows = rows_like(record=record, scale=x, demand=left, status=np.where(ended, "stopped", "ok"))
+    rows.attrs["sides"] = {"demand": "least"}
+    return rows
+
+
+def test_runs_that_ended_early_count_below_where_the_least_is_the_worst() -> None:
+    """A gap can only get smaller: fractiles fall with the scale, and a run exceeds a gap from below."""
+    rows = gaps()
+    truth = (np.where(rows.status == "ok", rows.demand, -1.0) <= 0.1).astype(float)
+    exceeded = fragility(rows, "scale", "demand", [0.1], early="exceed").states[0]
+    assert exceeded.exceeded == int(truth.sum()) and exceeded.left_out == 0
+    assert (np.diff(exceeded.exceeded_at / exceeded.runs_at) > 0).all()
+    unknown = int(((rows.status != "ok") & (rows.demand > 0.1)).sum())
+    assert unknown > 10 and fragility(rows, "scale", "demand", [0.1]).states[0].left_out == unknown
+    with pytest.raises(InputError, match=rf"{unknown} runs ended early above demand = 0.1"):
+        fragility(rows, "scale", "demand", [0.1], early="refuse")
+    found = ida(rows, "scale", "demand").fractiles
+    for name in ("p16", "p50", "p84"):
+        finite = found[name][np.isfinite(found[name])]
+        assert len(finite) and (np.diff(finite) < 0).all() and not (found[name] == np.inf).any()
+    assert np.isneginf(found["p16"].iloc[-1])
+    plot_ida(ida(rows, "scale", "demand"))
+
+
+def test_least_values_of_different_intensities_begin_where_all_curves_do() -> None:
+    rows = rows_like(
+        record=["a"] * 3 + ["b"] * 3, scale=[1.0, 2.0, 3.0] * 2, intensity=[1.0, 2.0, 3.0, 1.5, 3.0, 4.5],
+        demand=[0.8, 0.6, 0.4, 0.9, 0.7, 0.5],
+    )  # fmt: skip
+    rows.attrs["sides"] = {"demand": "least"}
+    found = ida(rows, "intensity", "demand").fractiles
+    assert found.intensity.iloc[0] == 1.5 and found["p16"].iloc[0] == pytest.approx(0.7)
+
+
+def test_a_demand_that_is_no_extreme_says_nothing_in_a_run_that_ended_early() -> None:
+    rows = gaps()
+    rows.attrs["sides"] = {"demand": ""}
+    early = int((rows.status != "ok").sum())
+    with pytest.raises(InputError, match=rf"demand: {early} runs ended early, and it is neither the largest nor"):
+        ida(rows, "scale", "demand")
+    with pytest.raises(InputError, match=rf"{early} runs ended early and do not bound demand"):
+        fragility(rows, "scale", "demand", [0.1], early="refuse")
+
+
+SIDES = {
+    "peak_displacement": "most", "minimum_gap_1": "least", "capacity_used_2": "most", "residual_displacement": "",
+    "effective_damping": "", "most_friction_1": "most", "least_friction_1": "least", "capacity_left_1": "least",
+}  # fmt: skip
+FORMULAS = {
+    "Max(capacity_used_1, capacity_used_4)": "most",
+    "least(normal_force_1) / 112e3": "least",
+    "1 - minimum_gap_1 / 0.2": "most",
+    "Min(minimum_gap_1, minimum_gap_2) - 2 * peak_displacement": "least",
+    "peak_displacement - peak_sliding_1": "",
+    "peak_force / peak_displacement": "",
+    "last(displacement_E1)": "",
+    "sqrt(peak(displacement_E1))": "most",
+    "Abs(minimum_gap_1)": "",
+    "peak_force * factor": "",
+}
+
+
+def test_every_column_knows_how_a_run_that_ended_early_bounds_it(tmp_path: Path) -> None:
+    """It is written with the rows, and read from them."""
+    quantities = {f"q{number}": text for number, text in enumerate(FORMULAS)}
+    names = sorted({re.sub(r"_\d$", "", name) for name in SIDES})
+    axes = {"factor": {"sets": "motion.amplitude", "values": [0.003]}}
+    made = load_study({"scene": "fenz-test1", "keep": names, "quantities": quantities, "axes": axes})
+    expected = SIDES | dict(zip(quantities, FORMULAS.values(), strict=True))
+    assert {name: made.keep.side(name) for name in expected} == expected
+    msfp_gen.study(made, tmp_path, threads=True, workers=1)
+    sides = read_study(tmp_path).attrs["sides"]
+    assert {name: sides[name] for name in expected} == expected and side_of(read_study(tmp_path), "q1") == "least"
 
 
 def test_several_damage_states_are_sorted_and_written_with_their_bands() -> None:
