@@ -5,10 +5,10 @@ Loads at rest, vertical modes and the selected effects of each bearing follow fr
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from msfp_gen.scene.friction_parameters import select_friction
 from msfp_gen.scene.scene_fields import Fidelity, Limits
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_seats, check_standing, needed_rotational_stiffness
+from msfp_gen.scene.system import OtherSystem
 from msfp_gen.scene.top import NodeTop
 from msfp_gen.specification.friction_laws import Law, law_of
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
@@ -104,7 +105,7 @@ class VerticalModes(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class BuildingScene:
+class BuildingScene(OtherSystem):
     """The complete input of the run of a building.
 
     building: the superstructure. bearings: at least one, of any layouts. motion: of the ground, from rest, in
@@ -114,6 +115,7 @@ class BuildingScene:
     Raises InputError: inconsistent parts, or weights that the bearings do not balance.
     """
 
+    run_options: ClassVar[frozenset[str]] = frozenset({"threads"})
     building: Building
     bearings: Sequence[BuildingBearing]
     motion: Motion
@@ -325,6 +327,25 @@ class BuildingScene:
         from msfp_gen.buildings.dataset import columns
 
         return columns(self)
+
+    def with_bearings(self, change: Callable[[Bearing, Law | None], Bearing]) -> Self:
+        """The scene with every bearing changed; a message of `change` begins with the label of the bearing."""
+        bearings = []
+        for index, mount in enumerate(self.bearings):
+            with prefixed(f"{self.label(index)}: "):
+                bearings.append(replace(mount, bearing=change(mount.bearing, mount.law)))
+        return replace(self, bearings=bearings)
+
+    def beginning_like(self, others: Sequence[Self]) -> Self:
+        """The scene with uplift from the start in the bearings that have it in any of `others`."""
+        uplift = np.any([[effects.uplift for effects in other.modelled] for other in others], axis=0)
+        bearings = [
+            replace(mount, effects=replace(mount.effects or Auto(), uplift=True))
+            if flagged and not effects.uplift
+            else mount
+            for mount, flagged, effects in zip(self.bearings, uplift, self.modelled, strict=True)
+        ]
+        return self if bearings == list(self.bearings) else replace(self, bearings=bearings)
 
     def at_fidelity(self, word: str) -> Any:
         """The scene at a level of fidelity, as of `scene.fidelity.at_fidelity`."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, ClassVar, Self
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import check_fields, require_type
@@ -19,8 +21,17 @@ from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_seats, check_standing, standing_of
 from msfp_gen.scene.top import NodeTop, Top
 from msfp_gen.specification import contract
-from msfp_gen.specification.friction_laws import LONGEST
+from msfp_gen.specification.friction_laws import LONGEST, Law
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
+
+# Word in the name of a model -> (field of `Auto`, value) that gives the effect.
+WIDER: dict[str, tuple[str, Any]] = {
+    "spatial": ("dimension", "spatial"),
+    "inertial": ("sliders", "inertial"),
+    "rims": ("rims", True),
+    "uplift": ("uplift", True),
+    "pvt": ("friction", "pvt"),
+}
 
 
 @dataclass(frozen=True, init=False)
@@ -36,6 +47,8 @@ class Scene(SceneFields):
     the `[motion]` table of a scene file, from which the scene can be written back. Raises InputError: a part of the
     wrong type, or inconsistent parts.
     """
+
+    run_options: ClassVar[frozenset[str]] = frozenset({"strict", "gradients", "energy_gradients", "gradient_errors"})
 
     def __post_init__(self) -> None:
         for name, kind in _PART_TYPES.items():
@@ -103,6 +116,22 @@ class Scene(SceneFields):
     def effect_selection(self) -> EffectSelection:
         """The effects at the start of the run, with the reason for each selection."""
         return select_effects(self)
+
+    def with_bearings(self, change: Callable[[Bearing, Law | None], Bearing]) -> Self:
+        """The scene with its bearing changed. change: of a bearing and its friction law at the start."""
+        return replace(self, bearing=change(self.bearing, self.law[1]))
+
+    def beginning_like(self, others: Sequence[Self]) -> Self:
+        """The scene itself: a run takes in the effects that it needs, which `with_effects_of` gives to all."""
+        return self
+
+    def with_effects_of(self, models: Sequence[str]) -> Self | None:
+        """The scene with every effect of several models, by their names; None where they are the same, or given."""
+        words = [set(model.split("-")) for model in models]
+        if not isinstance(self.effects, Auto) or all(word == words[0] for word in words):
+            return None
+        added = {name: value for word, (name, value) in WIDER.items() if word in set().union(*words)}
+        return replace(self, effects=replace(self.effects, **added))
 
     def _check_times(self) -> None:
         if self.duration is not None and self.duration > self.motion.duration * (1 + 1e-12):  # tolerance for rounding

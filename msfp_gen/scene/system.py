@@ -6,18 +6,21 @@ knows the scene of one bearing, and calls the method of the same name of any oth
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
 from importlib.resources.abc import Traversable
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+
+from msfp_gen.common.errors import InputError
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.bearing import Bearing
     from msfp_gen.scene.scene_fields import Limits
     from msfp_gen.scene.solver import Solver
+    from msfp_gen.specification.friction_laws import Law
     from msfp_gen.specification.layout import ModelSpec
 
 Table = dict[str, Any]
@@ -61,6 +64,65 @@ class System(Protocol):
     def specs(self) -> tuple[ModelSpec, ...]:
         """Models with which the run starts, each once."""
 
+    @property
+    def run_options(self) -> frozenset[str]:
+        """Names of the options of `simulate` that a run has, beside progress and checkpoints."""
+
+    def with_bearings(self, change: Callable[[Bearing, Law | None], Bearing]) -> Self:
+        """It with every bearing changed."""
+
+    def beginning_like(self, others: Sequence[Self]) -> Self:
+        """It with every effect with which any of `others` begins."""
+
+    def with_effects_of(self, models: Sequence[str]) -> Self | None:
+        """It with every effect of the models with which several runs ended; None where nothing is to be added."""
+
+
+class OtherSystem:
+    """Base of systems that are no `Scene`: what the functions of the core ask of them. A subclass has `start`.
+
+    run_options: names of the options of `simulate` that a run has, beside progress and checkpoints.
+    """
+
+    run_options: ClassVar[frozenset[str]] = frozenset()
+
+    def start(self, **options: Any) -> Any:
+        """The run before its first step, as of `simulation.system.Run`. Raises InputError, RunError."""
+        raise NotImplementedError
+
+    def explain(self) -> list[Any]:
+        """Tables that describe it, as of `scene.explain.explain`."""
+        return []
+
+    def quantities(self) -> dict[str, Any]:
+        """What tables report of a run, as of `results.quantities.quantities`."""
+        return {}
+
+    def columns(self) -> dict[str, Any]:
+        """The columns of a table of all rows, as of `results.dataset.columns`."""
+        return {}
+
+    @property
+    def figures(self) -> Mapping[str, Any]:
+        """The figures of a run by their names, as of `figures.figures_of`."""
+        return {}
+
+    def at_fidelity(self, word: str) -> Any:
+        """It at a level of fidelity, as of `scene.fidelity.at_fidelity`."""
+        raise InputError(f"fidelity = {word!r}: this system has no such model; leave it out")
+
+    def with_bearings(self, change: Callable[[Bearing, Law | None], Bearing]) -> Any:
+        """It with every bearing changed. change: of a bearing and its friction law at the start. Raises InputError."""
+        raise InputError("this system has no bearings that can be changed")
+
+    def beginning_like(self, others: Sequence[Any]) -> Any:
+        """It with every effect with which any of `others`, which differ in values alone, begins."""
+        return self
+
+    def with_effects_of(self, models: Sequence[str]) -> Any | None:
+        """It with every effect of the models with which several runs ended; None where nothing is to be added."""
+        return None
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -79,6 +141,11 @@ class Kind:
     files: Callable[[Mapping[str, Any]], Iterator[tuple[str, Table, tuple[str, ...]]]]
     common: tuple[str, ...] = ()
     presets: Traversable | None = None
+
+
+def is_system(value: object) -> bool:
+    """Whether a value can be run."""
+    return hasattr(type(value), "run_options")
 
 
 @cache

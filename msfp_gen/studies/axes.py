@@ -25,7 +25,6 @@ from msfp_gen.scene.file.catalogue import parsed, suggestion
 from msfp_gen.scene.file.changes import changed_table, keys_of, multiplied_table
 from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.scene.file.source import located_value, scene_of
-from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import System
 from msfp_gen.studies.bounding import bounded_scene
 from msfp_gen.studies.bounding.factors import FactorTable
@@ -418,7 +417,7 @@ class SceneFactory:
         self._fixed: Table = {}  # parts of every scene that are read already
         if not recipe.records and "motion" not in changed:
             self._fixed["motion"] = self.base.motion
-            if isinstance(self.base, Scene):
+            if hasattr(self.base, "motion_table"):
                 self._fixed["motion_table"] = self.base.motion_table
         self._table = {key: value for key, value in base.items() if key not in self._fixed}
 

@@ -26,13 +26,12 @@ from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
-from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.errors import InputError, MsfpError, RunError
 from msfp_gen.model.model import build_model, working_time
 from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.system import System
+from msfp_gen.scene.system import System, is_system
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.simulate import simulate, state_at_start
 from msfp_gen.studies.estimation.backbone_run import check_backbone, run_backbone
@@ -263,12 +262,12 @@ def simulate_batch(
     with the index, as in `scenes[3]`), or the rows of all runs do not fit into memory. RunError: a scene failed at its
     start, so that it has no rows, or a worker process died; the other runs are ended.
     """
-    if isinstance(scenes, Scene | BuildingScene):
+    if is_system(scenes):
         raise InputError("scenes: this is one scene; give a list of them")
     scenes = list(scenes)
     labels = [f"scenes[{index}]" for index in range(len(scenes))]
     for label, scene in zip(labels, scenes, strict=True):
-        if not isinstance(scene, Scene | BuildingScene):
+        if not is_system(scene):
             raise InputError(f"{label}: a {type(scene).__name__} is no scene; give what load_scene returns")
     runs = completed_runs(scenes, workers, processes=processes, strict=strict, labels=labels)
     require_memory([scene for scene in scenes if isinstance(scene, Scene)])
@@ -307,7 +306,7 @@ def completed_runs(
     for label, scene in zip(labels, scenes, strict=True):
         with _located(label):
             check_method(scene)
-            if strict and (scene.fidelity == "backbone" or not isinstance(scene, Scene)):
+            if strict and (scene.fidelity == "backbone" or "strict" not in scene.run_options):
                 raise InputError("strict: only runs of one bearing have it, not of the level 'backbone'; leave it out")
     shared = None if progress is None else SharedProgress(len(scenes), progress)
     threads = max(1, usable_cores() // max(1, min(count, len(scenes))))
@@ -390,7 +389,8 @@ def _run(label: str, scene: System, strict: bool, proceed: Proceed | None, threa
     """The result of one run of a batch, in a worker; its RunError if it has no rows."""
     try:
         with _located(label):
-            options = {"strict": strict} if isinstance(scene, Scene) else {"threads": threads}
+            options = {"strict": strict, "threads": threads}
+            options = {name: value for name, value in options.items() if name in scene.run_options}
             return run_to_end(scene, progress=proceed or raise_if_stopped, **options)
     except RunError as error:
         return error

@@ -6,18 +6,17 @@ CSV and a figure of the loops.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.errors import InputError, RunError, prefixed
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.figures.bearing import axes_along
@@ -38,9 +37,7 @@ from msfp_gen.results.quantities import Source, quantities
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.fidelity import check_stack
 from msfp_gen.scene.friction_parameters import proportional
-from msfp_gen.scene.scene import Scene
 from msfp_gen.specification.friction_laws import Law
-from msfp_gen.specification.layout import Auto
 from msfp_gen.studies.batch import ENDED, completed_runs
 from msfp_gen.studies.bounding.factors import PROPERTIES, RULES, FactorTable
 
@@ -48,19 +45,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.results.result import Result
     from msfp_gen.scene.bearing import Bearing
     from msfp_gen.scene.system import System
 
 CASES = ("lower", "nominal", "upper")
-# Word in the name of a model -> (field of `Auto`, value) that gives the effect to all cases.
-WIDER: dict[str, tuple[str, Any]] = {
-    "spatial": ("dimension", "spatial"),
-    "inertial": ("sliders", "inertial"),
-    "rims": ("rims", True),
-    "uplift": ("uplift", True),
-    "pvt": ("friction", "pvt"),
-}
 Progress = Callable[[float, float], None]
 
 
@@ -78,7 +66,7 @@ class Case:
 
     name: str
     scene: System
-    result: Result | BuildingResult | None
+    result: Any
     characterisation: Characterisation | None
     failure: str = ""
 
@@ -192,21 +180,10 @@ def bound(scene: System, table: FactorTable, *, progress: Progress | None = None
     case has rows.
     """
     cases = _cases(scene, table, progress)
-    if isinstance(scene, Scene) and (common := _common_effects(scene, cases)) is not None:
-        cases = _cases(replace(scene, effects=common), table, progress)
+    models = [case.result.provenance.get("model", "").split(", then ")[-1] for case in cases if case.result is not None]
+    if (wider := scene.with_effects_of(models)) is not None:
+        cases = _cases(wider, table, progress)
     return Bounds(table, _lambdas(_typical(scene), table), tuple(cases))
-
-
-def _common_effects(scene: Scene, cases: Sequence[Case]) -> Auto | None:
-    """`Auto` with every effect that the last model of any case has; None where all cases have the same model."""
-    if not isinstance(scene.effects, Auto):
-        return None
-    results = [case.result for case in cases if case.result is not None]
-    models = [set(result.provenance["model"].split(", then ")[-1].split("-")) for result in results]
-    if all(model == models[0] for model in models):
-        return None
-    words = set().union(*models)
-    return replace(scene.effects, **{name: value for word, (name, value) in WIDER.items() if word in words})
 
 
 def _cases(scene: System, table: FactorTable, progress: Progress | None) -> list[Case]:
@@ -230,43 +207,20 @@ def _case(name: str, scene: System, result: Any) -> Case:
 def bounded_scenes(scene: System, table: FactorTable) -> dict[str, System]:
     """Case -> the scene with its properties multiplied; "nominal" is `scene` itself.
 
-    A bearing of a building begins with the same effects in all cases: with uplift in all if it has uplift in any, the
-    nominal case included. Raises InputError as `bound`.
+    All begin with the same effects, the nominal case included. Raises InputError as `bound`.
     """
     scenes = {case: bounded_scene(scene, table, case) for case in CASES}
-    buildings = {case: bounded for case, bounded in scenes.items() if isinstance(bounded, BuildingScene)}
-    uplift = np.any([[effects.uplift for effects in bounded.modelled] for bounded in buildings.values()], axis=0)
-    return scenes | {case: _with_uplift(bounded, uplift) for case, bounded in buildings.items()}
-
-
-def _with_uplift(scene: BuildingScene, uplift: Sequence[bool]) -> BuildingScene:
-    """The scene with uplift from the start in the flagged bearings; the other bearings may switch to it in the run."""
-    bearings = [
-        replace(mount, effects=replace(mount.effects or Auto(), uplift=True))
-        if flagged and not effects.uplift
-        else mount
-        for mount, flagged, effects in zip(scene.bearings, uplift, scene.modelled, strict=True)
-    ]
-    return scene if bearings == list(scene.bearings) else replace(scene, bearings=bearings)
+    return {case: bounded.beginning_like(list(scenes.values())) for case, bounded in scenes.items()}
 
 
 def bounded_scene(scene: System, table: FactorTable, case: str) -> System:
     """The scene of one case of CASES. Raises InputError as `bound`."""
     check_stack(scene)
-    label = f"{scene.name or 'scene'}, {case}"
-    if isinstance(scene, Scene):
-        bearing = _bounded_bearing(scene.bearing, scene.law[1], table, case)
-        return scene if case == "nominal" else replace(scene, bearing=bearing, name=label)
-    assert isinstance(scene, BuildingScene)
-    bearings = []
-    for index, mount in enumerate(scene.bearings):
-        with prefixed(f"{scene.label(index)}: "):
-            bearing = _bounded_bearing(mount.bearing, mount.law, table, case)
-        bearings.append(replace(mount, bearing=bearing))
-    return scene if case == "nominal" else replace(scene, bearings=bearings, name=label)
+    bounded = scene.with_bearings(partial(_bounded_bearing, table=table, case=case))
+    return scene if case == "nominal" else replace(bounded, name=f"{scene.name or 'scene'}, {case}")
 
 
-def _bounded_bearing(bearing: Bearing, law: Law | None, table: FactorTable, case: str) -> Bearing:
+def _bounded_bearing(bearing: Bearing, law: Law | None, *, table: FactorTable, case: str) -> Bearing:
     """The bearing with its properties multiplied. law: its friction law. Raises InputError."""
     lambdas = _lambdas(bearing, table)
     if "friction" in lambdas and law is not None and not proportional(law, bearing):
@@ -442,13 +396,10 @@ def _draw(axes: Axes, bounds: Bounds, cases: list[Case], axis: int) -> None:
     axes.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
 
 
-def _loop(result: Result | BuildingResult | None) -> tuple[Array, Array]:
-    """Displacement across the bearing [m] and force on its top [N], both shape (k, 3); of a building mean and sum."""
-    assert result is not None  # cases without rows are not drawn
-    if isinstance(result, BuildingResult):
-        u = np.mean([bearing.history.displacement for bearing in result.bearings], axis=0)
-        return u, np.sum([bearing.history.top_force for bearing in result.bearings], axis=0)
-    return result.history.displacement, result.history.top_force
+def _loop(result: Any) -> tuple[Array, Array]:
+    """Mean displacement across the bearings [m] and sum of the forces on their tops [N], both shape (k, 3)."""
+    rows = [bearing.history for bearing in result.bearings]
+    return np.mean([row.displacement for row in rows], axis=0), np.sum([row.top_force for row in rows], axis=0)
 
 
 def _label(bounds: Bounds, case: Case) -> str:
