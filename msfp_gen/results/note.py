@@ -15,13 +15,13 @@ class Note:
     """Message of a monitor, in one line.
 
     time [s]: of the first detection. kind: "rims", "uplift", "inertia", "heat", "law_speed", "law_load",
-    "law_temperature", "plane", "jammed", "energy", "tolerance", "damping", "creep", "peak", "rattle", "footprint",
-    "ringing", "gradient", "fidelity" or "value". surface: 1..n-1; 0: none. value: what the text gives, of a monitor the
-    one furthest beyond its limit: distance beyond the capacity [m], force [N], inertial over normal force [-],
-    temperature rise [K], slip velocity [m/s], temperature [degC], share of the energy [-], movement [m], distance of
-    the normal force from the axis [m], number of landings, error over the derivative [-], value of the scene. action:
-    the effects with which the run continued; "": it continued unchanged, or ended. bearing: of a building, from 1; 0:
-    none.
+    "law_temperature", "plane", "jammed", "energy", "tolerance", "vibration", "damping", "creep", "peak", "rattle",
+    "footprint", "ringing", "gradient", "fidelity" or "value". surface: 1..n-1; 0: none. value: what the text gives, of
+    a monitor the one furthest beyond its limit: distance beyond the capacity [m], force [N], inertial over normal force
+    [-], temperature rise [K], slip velocity [m/s], temperature [degC], share of the energy or the force [-], movement
+    [m], distance of the normal force from the axis [m], number of landings, error over the derivative [-], value of the
+    scene. action: the effects with which the run continued; "": it continued unchanged, or ended. bearing: of a
+    building, from 1; 0: none.
     """
 
     time: float
@@ -71,7 +71,18 @@ CONSEQUENCES = {
 """What follows for the results where the run goes on without the effect."""
 IMPORTANCE = (
     *("fidelity", "value", "jammed", "energy", "peak", "footprint", "uplift", "rims", "heat", "law_load", "law_speed"),
-    *("law_temperature", "creep", "tolerance", "rattle", "damping", "inertia", "plane", "ringing", "gradient"),
+    *(
+        "law_temperature",
+        "creep",
+        "vibration",
+        "tolerance",
+        "rattle",
+        "damping",
+        "inertia",
+        "plane",
+        "ringing",
+        "gradient",
+    ),
 )
 """Kinds of notes, those first that question most of the results."""
 RISING = ("rims", "inertia", "heat", "law_speed")

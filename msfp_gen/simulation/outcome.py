@@ -16,7 +16,7 @@ from msfp_gen.results.geometry import contact_offsets
 from msfp_gen.results.history import Event, Extremes, History
 from msfp_gen.results.note import Note, monitor_notes
 from msfp_gen.results.sliding import intervals, sliding_surfaces
-from msfp_gen.scene.effect_selection import rigid_mass_limit, scene_doubts
+from msfp_gen.scene.effect_selection import load_at_rest, rigid_mass_limit, scene_doubts
 from msfp_gen.scene.effect_switching import JAM_STATUSES
 from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.scene import Scene
@@ -123,7 +123,13 @@ DAMPING_LIMIT = 0.01  # energy dissipated by contact damping, over that dissipat
 FOOTPRINT_LOAD = 0.05  # N over its median above which the contact position is checked against the face of the slider
 LANDINGS, LANDING_TIME = 20, 0.1  # landings of a surface within a time [s] above which a note is written
 TOLERANCE_LIMIT = 0.05  # force of the top's spring at the tolerance of angles, over the peak force, likewise
+VIBRATION_LIMIT = 0.001  # estimated error by vibrations of a stuck mass, over the peak force, likewise
+PHASE_ERROR = 0.0404  # phase by which a step h of TR-BDF2 is late, over (omega h)^3 (Hosea and Shampine 1996)
+UNEVEN = 2.0  # mean cube of the steps over the cube of their mean, where rows do not show the steps
+LARGEST_PHASE = 1.4  # error of the phase [rad] at which two vibrations differ as much as ones of any phase: sqrt(2)
+REMEMBERED = 20.0  # sliding displacement after which a vibration is forgotten, over the sum of yield displacements
 CREEP_TIME = 10.0  # time stuck off the centre [s] after which creep is looked for
+LOADING = 1.0  # slip less elastic slip of a Bouc-Wen law on the way to |(Y, Z)| = 0.96, over d_y: artanh(Y) - Y
 CREEP_SHARE = 0.01  # creep over the peak displacement above which a note is written
 TEXTS = {
     "peak": "the normal force of surface {surface} rises to {value:.4g} N: mass and contacts are rigid, such peaks do "
@@ -132,10 +138,13 @@ TEXTS = {
     "give a smaller solver.rtol",
     "tolerance": "the tolerance of angles is {value:.3g} N in the spring of the top, {share:.2g} of the peak force: "
     "vibrations after a change of the load may be filtered; give a smaller solver.rtol",
+    "vibration": "the mass vibrates on its stuck bearing at {rate:.2g} Hz, hardly damped, and the errors of the steps "
+    "add up: the force is off by some {value:.1%} RMS of its peak, an order of magnitude; give a smaller "
+    "solver.rtol, or run with --error 0.5%",
     "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
     "give a smaller contact_damping",
-    "creep": "the displacement that remains may be wrong by {value:.3g} m or more, by which the bearing moved while no "
-    "surface slid: Bouc-Wen friction creeps under small cycles; give effects.bouc_wen = 'plastic'",
+    "creep": "the displacement that remains may be wrong by {value:.3g} m or more, by which surfaces moved while none "
+    "slid: Bouc-Wen friction creeps under small cycles; give effects.bouc_wen = 'plastic'",
     "footprint": "the normal force of surface {surface} acts {value:.3g} m from the axis of its slider, outside the "
     "face: a real slider would tip; give effects.uplift = true",
     "rattle": "surface {surface} landed {value:d} times: loose sliders rattle, and their path depends on every "
@@ -149,8 +158,8 @@ def _note(kind: str, time: float, value: float, surface: int = 0, **more: float)
     return Note(float(time), kind, surface, float(value), text)
 
 
-def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
-    """The notes that follow from the rows of a whole run; `effects`: of its last segment."""
+def history_notes(scene: Scene, effects: Effects, history: History, steps: int) -> tuple[Note, ...]:
+    """The notes that follow from the rows of a whole run of so many steps; `effects`: of its last segment."""
     unseen = (Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity]),) if scene.fidelity in UNSEEN else ()
     stack = scene.fidelity != "equivalent"
     doubts = unseen + tuple(Note(0.0, "value", *doubt) for doubt in scene_doubts(scene) if stack)
@@ -158,6 +167,7 @@ def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Not
     physics += creep_notes(scene, effects, history)
     physics += peak_notes(scene, effects, history)
     numerics = energy_notes(scene, history) + tolerance_notes(scene, effects, history)
+    numerics += vibration_notes(scene, effects, history, steps)
     return doubts + numerics + damping_notes(scene, history) + physics
 
 
@@ -189,6 +199,42 @@ def tolerance_notes(scene: Scene, effects: Effects, history: History) -> tuple[N
     if not force > TOLERANCE_LIMIT * across[row] > 0:
         return ()
     return (_note("tolerance", history.time[row], force, share=force / across[row]),)
+
+
+def vibration_notes(scene: Scene, effects: Effects, history: History, steps: int) -> tuple[Note, ...]:
+    """A note where a mass vibrates on stuck surfaces so long that the errors of the steps add up to `VIBRATION_LIMIT`.
+
+    Step control bounds the error of each step. A motion that slides forgets it after `REMEMBERED`; a vibration that
+    only contact damping damps does not, and its phase falls behind by `PHASE_ERROR` (omega h)^3 in each step. The force
+    of the vibration is mass x omega x rate, without the rate with which the deformation follows a smooth motion of
+    the ground, and its error is that force times the error of the phase.
+    """
+    top, surfaces = scene.top, scene.bearing.surfaces
+    flexibility = sum(s.yield_displacement / s.friction if s.friction > 0 else np.inf for s in surfaces)
+    rest, duration = load_at_rest(scene), float(history.time[-1] - history.time[0])
+    implicit = scene.solver.method == "implicit" and effects.sliders == "inertial"
+    if not (isinstance(top, MassTop) and implicit and 0 < flexibility < np.inf and rest > 0 and duration > 0):
+        return ()
+    turn = float(np.sqrt(rest / (flexibility * top.mass)))
+    stuck = ~sliding_surfaces(history).any(axis=1)
+    between = np.gradient(history.time)
+    rows_of_steps = scene.output_step is None and len(between) > steps
+    squares = between**2 if rows_of_steps else UNEVEN * (duration / max(steps, 1)) ** 2
+    rate = np.linalg.norm(history.slip_velocity, axis=-1).sum(axis=1)
+    free = rate
+    if not scene.motion.sampled:  # a record has all frequencies
+        times = np.minimum(history.time, scene.motion.duration)
+        free = np.maximum(rate - np.linalg.norm(scene.motion.evaluate(times, 3)[:, :2], axis=1) / turn**2, 0.0)
+    slid = np.cumsum(rate * between * ~stuck)
+    phase = np.cumsum(PHASE_ERROR * turn**3 * squares * between * stuck)
+    since = np.searchsorted(slid, slid - REMEMBERED * sum(s.yield_displacement for s in surfaces))
+    late = np.minimum(phase - phase[since], LARGEST_PHASE)
+    peak = float(np.hypot(*history.top_force[:, :2].T).max())
+    error = top.mass * turn * float(np.sqrt(np.sum(between * stuck * (late * free) ** 2) / duration))
+    if not error > VIBRATION_LIMIT * peak > 0:
+        return ()
+    row = int(stuck.argmax())
+    return (_note("vibration", history.time[row], error / peak, rate=turn / (2 * np.pi)),)
 
 
 def peak_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
@@ -231,7 +277,8 @@ def footprint_notes(scene: Scene, effects: Effects, history: History) -> tuple[N
 def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
     """A note where a bearing with a Bouc-Wen law was stuck off its centre for long and moved nevertheless.
 
-    Stuck surfaces deform by up to twice their yield displacements, each time they stick; movement beyond that is creep.
+    Creep is slip less the elastic part d_y (Y, Z), summed over the surfaces and the times for which all are stuck. Less
+    than `LOADING` d_y at one time is what friction takes to grow, and does not count.
     """
     across = np.linalg.norm(history.displacement[:, :2], axis=1)
     off_centre = across > max(CREEP_SHARE * float(across.max()), 1e-12)
@@ -239,9 +286,12 @@ def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note,
     long = [(start, start + length) for start, length in stuck if length > 1.0]
     if is_plastic(effects.bouc_wen) or sum(end - start for start, end in long) < CREEP_TIME:
         return ()
-    moves = [float(np.abs(np.diff(np.interp(pair, history.time, across)))[0]) for pair in long]
-    elastic = 2 * sum(surface.yield_displacement for surface in scene.bearing.surfaces)
-    moved = sum(move for move in moves if move > elastic)
+    yields = np.array([surface.yield_displacement for surface in scene.bearing.surfaces])
+    moved = 0.0
+    for first, last in (np.searchsorted(history.time, pair).clip(max=len(history.time) - 1) for pair in long):
+        elastic = yields * np.linalg.norm(history.friction_state[last] - history.friction_state[first], axis=-1)
+        crept = np.abs(history.sliding[last] - history.sliding[first]) - elastic
+        moved += float(crept[crept > LOADING * yields].sum())
     if moved <= CREEP_SHARE * float(across.max()):
         return ()
     return (_note("creep", long[0][0], moved),)

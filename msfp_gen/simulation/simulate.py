@@ -408,7 +408,7 @@ def _result(sequence: RunSequence, history: History) -> Result:
         provenance=provenance_of(scene.solver, ", then ".join(segment.model.spec.key for segment in segments))
         | {"build_seconds": f"{sum(segment.setup for segment in segments):.3g}"},
         notes=tuple(sequence.notes)
-        + history_notes(scene, last.model.effects, thinned_history(history))
+        + history_notes(scene, last.model.effects, thinned_history(history), total.steps)
         + landing_notes(events)
         + (gradient_notes(scene, last.model.effects, events) if parameters else ()),
         recorded_extremes=extremes_of(segments),

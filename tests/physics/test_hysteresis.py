@@ -17,13 +17,16 @@ from msfp_gen import (
     Effects,
     InitialState,
     Layout,
+    Load,
     Motion,
     Scene,
     Solver,
     Surface,
     Top,
+    presets,
     simulate,
 )
+from msfp_gen.studies.accuracy.timed_run import errors, run_native
 
 RADIUS, HEIGHT, MU, OFFSET, WEIGHT, GRAVITY = 2.2, 0.1, 0.06, 0.08, 1e6, 9.8
 
@@ -169,11 +172,53 @@ def test_a_run_that_creeps_says_so() -> None:
     creeping = simulate(report)
     held = simulate(replace(plastic, effects=replace(plastic.effects, dimension="planar", rims=False)))
     assert [note.kind for note in held.notes] == []
-    (note,) = creeping.notes
+    (note,) = [note for note in creeping.notes if note.kind == "creep"]
     moved = float(np.ptp(creeping.history.sliding))
-    assert note.kind == "creep"
     assert "bouc_wen = 'plastic'" in note.line
     assert 0.3 * moved < note.value < 1.05 * moved  # part of it in rows where friction is nearly mobilised
+
+
+@pytest.mark.parametrize(("name", "pushed", "load"), [("double-fp", 0.1, 2e6), ("prototype-tfp", 0.08, 112e3)])
+def test_creep_under_a_ripple_of_the_load_is_that_of_all_surfaces(name: str, pushed: float, load: float) -> None:
+    """Pushed out, back by 2 %, and held by a soft rig for a minute, under a load that varies by 3 %."""
+    bearing, rise = presets.bearing(name), smooth(np.linspace(0, 1, 101))
+    time, path = np.linspace(0, 10, 201), pushed * np.concatenate([rise, 1 - 0.02 * rise[1:]])
+    top = Top.rig(load, 5 * load / bearing.surfaces[0].radius, rotational_stiffness=10 * load)
+    ripple = Load.harmonic((0.0, 0.0, 0.03 * load), frequency=1.0, cycles=58, lead_in=11.0)
+    motion = Motion.from_arrays(time, np.outer(path, [1.0, 0.0, 0.0])).held(70.0)
+    run = simulate(Scene(bearing, motion, top, Effects(dimension="planar"), load=ripple, output_step=0.05))
+    (note,) = [note for note in run.notes if note.kind == "creep"]
+    held = (run.history.time > 12) & (run.history.time < 68)
+    yields = np.array([surface.yield_displacement for surface in bearing.surfaces])
+    elastic = yields * np.ptp(run.history.friction_state[held], axis=0)[:, 0]
+    moved = float((np.ptp(run.history.sliding[held], axis=0) - elastic).clip(0).sum())
+    assert 0.5 * moved < note.value < 2 * moved and moved > 5e-4
+
+
+def smooth(share: np.ndarray) -> np.ndarray:
+    """A rise from 0 to 1 that starts and ends at rest."""
+    return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))
+
+
+def vibrating(amplitude: float, **solver: Any) -> Scene:
+    """A mass on a triple pendulum that slides for moments, and vibrates on stuck surfaces between."""
+    top = Top.mass(17.7e3, 5.3e3, 0.4, 1.73e6, 8.7e3, 1.66e8, 1.7e5)
+    motion, effects = Motion.harmonic(amplitude, 0.3, cycles=2), Effects(dimension="planar", bouc_wen="plastic")
+    bearing = presets.bearing("prototype-tfp").replace(yield_displacement=9e-4)
+    return Scene(bearing, motion, top, effects, Solver(**{"rtol": 1e-4, **solver}))
+
+
+@pytest.mark.parametrize("output_step", [None, 0.01])
+def test_vibrations_of_a_stuck_mass_whose_errors_add_up_are_noted(output_step: float | None) -> None:
+    """The number is the true error within a factor of four; at a tight tolerance there is no note."""
+    scene = vibrating(0.07)
+    tight = run_native("esdirk4", scene, 1e-7, 60.0, repeats=0)
+    true = errors(run_native("implicit", scene, 1e-4, 60.0, repeats=0), tight)
+    assert true is not None and true.force_rms > 0.005
+    (note,) = [note for note in simulate(replace(scene, output_step=output_step)).notes if note.kind == "vibration"]
+    assert true.force_rms / 4 < note.value < 4 * true.force_rms and "--error" in note.text
+    for calm in (vibrating(0.07, rtol=1e-7), vibrating(0.07, method="esdirk4"), vibrating(0.25)):
+        assert not [note for note in simulate(replace(calm, output_step=output_step)).notes if note.kind == "vibration"]
 
 
 def test_contact_damping_that_changes_sliding_is_noted() -> None:
