@@ -215,4 +215,33 @@ def a_jolt(draw: Draw, duration: float, rate: float) -> Motion:
     return Motion.from_arrays(time, np.outer(acceleration / rate**2 * burst, [0.0, 0.0, 1.0]))
 
 
+ORDER = tuple(dict.fromkeys(BEARINGS))  # eight kinds of bearing
+DRIVES = ("mass, harmonic", "mass, noise", "mass, eight", "rig, line", "rig, circle")
+
+
+def campaign(seed: int, number: int) -> Scene:
+    """Scene `number` of a seed, of `len(ORDER) * len(DRIVES)`: every kind of bearing with every drive, effects by `Auto`.
+
+    Masses are on vertical springs of 10 to 25 Hz; they shake from 5 to 80 % of the reach, so some hardly slide.
+    """
+    draw, kind = Draw(seed, number), number % len(ORDER)
+    drive = DRIVES[number // len(ORDER) % len(DRIVES)]
+    what = Chosen(ORDER[kind], "constant", ("report", "plastic")[kind % 2])
+    bearing = a_bearing(draw, what)
+    load = draw.decades((200.0, 3000.0)) * GRAVITY * sum(body.mass for body in bearing.bodies)
+    size = reach(bearing) * draw.decades((0.05, 0.8))
+    frequency = min(draw.decades((0.1, 1.0)), FASTEST / (2 * pi * size), float(np.sqrt(STRONGEST / size)) / (2 * pi))
+    motion = {
+        "eight": lambda: Motion.figure_eight(size, pi * frequency, cycles=1.5, lead_in=1.0 / frequency),
+        "circle": lambda: Motion.circle(size, 2 * pi * frequency, cycles=1.5, lead_in=1.0 / frequency),
+        "noise": lambda: noise(draw, size, 0.0, draw.chance(0.5), 0.3),
+    }.get(drive.split(", ")[1], lambda: Motion.harmonic(size, frequency, cycles=2.0))()
+    mass, rate = load / GRAVITY, 2 * pi * draw.decades((10.0, 25.0))
+    top: Top = Top.mass(mass, 0.3 * mass, 0.4, 10.0 * load, 0.05 * load, mass * rate**2, 0.1 * mass * rate)
+    if drive.startswith("rig"):
+        held = 0.0 if what.bearing == "single-fp" else 10.0 * load  # its plate is the slider
+        top = Top.rig(load, 1e3 * load, 0.05 * load, held, 0.01 * held)
+    return Scene(bearing, motion, top, Auto(bouc_wen=what.hysteresis), name=f"{what.bearing}, {drive}")
+
+
 KINDS = (scene, slow_test)

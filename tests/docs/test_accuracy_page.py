@@ -48,6 +48,16 @@ def test_page_says_what_the_template_says():
     assert "{{" not in WRITTEN
 
 
+def test_bounds_are_ten_times_what_the_references_are_known_to():
+    """Of every table of methods: the bound, and by how much the two references differ RMS in force and sliding."""
+    found = re.findall(
+        r"Within ([\d.]+) %:.*?differ by (\S+) RMS and \S+ at most in force, (\S+) and", WRITTEN, re.DOTALL
+    )
+    assert len(found) == len(page.ALL_CASES)
+    for bound, *floors in found:
+        assert float(bound) / 100 >= 10 * max(map(float, floors))
+
+
 def test_every_case_of_the_issue_is_there():
     scenes = {case.scene for case in page.CASES}
     assert {f"fenz-test{k}" for k in range(1, 6)} <= scenes
