@@ -47,7 +47,8 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
     size = size_of(scene)
     bearings = [bearing.history.displacement[rows] for bearing in result.bearings]
     mean = np.mean(bearings, axis=0)
-    left = np.stack([bearing.history.gap[rows].min(axis=1) for bearing in result.bearings], axis=1)
+    gaps = [bearing.history.gap[rows] for bearing in result.bearings]
+    left = np.stack([gap.min(axis=1) for gap in gaps], axis=1)
     heights = np.diff([node.position[2] for node in scene.building.nodes])
     drift = np.hypot(*np.moveaxis(result.drift[rows, :, :2], -1, 0))
     frames = {
@@ -57,6 +58,7 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
         "top": -np.stack(bearings, axis=1),
         "ratio": result.axial_force[rows] / scene.axial_loads,
         "left": left,
+        "left_surface": np.stack([1.0 + gap.argmin(axis=1) for gap in gaps], axis=1),
         "mean": mean,
         "shear": result.base_reaction[rows, :2],
         "acceleration": np.stack([node[:, 2, :3] for node in nodes], axis=1),

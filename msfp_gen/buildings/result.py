@@ -23,6 +23,7 @@ from msfp_gen.results.note import Note
 from msfp_gen.results.result import AnyResult, Curve, OneBearing, Rows
 from msfp_gen.results.summary import summary_of_bearing, time_row
 from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.fidelity import Backbone
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
@@ -266,7 +267,7 @@ class BuildingResult(AnyResult):
                 "floors",
                 f"peak acceleration {acceleration['radial']:.4g} m/s^2, vertical {acceleration['E3']:.4g}{drift}",
             ),
-            ("N over N at rest", f"{s['minimum_load_ratio']:.2f} to {s['maximum_load_ratio']:.2f}"),
+            ("N over N at rest", summaries.ratios_text(s)),
             ("rims met", summaries.rims_text(s["bearings"])),
         ]
 
@@ -414,7 +415,8 @@ class BearingResult(OneBearing):
         """Main results as plain data, SI units; peaks are over all steps, lists are for the surfaces, bottom first.
 
         Keys of any bearing: see `Result.summary`; axial_load is at rest [N]. Other keys: number (from 1), name, layout,
-        position in plan [m]; minimum_load_ratio and maximum_load_ratio: axial force over the load at rest [-];
+        position in plan [m]; minimum_load_ratio and maximum_load_ratio: axial force over the load at rest, 0 where the
+        bearing lifts [-]; displacement_used: peak displacement over that at which all rims are met [-];
         dissipated: at the end [J].
         """
         least, most = self.building.extremes.axial_force[self.index] / self.axial_load
@@ -424,7 +426,8 @@ class BearingResult(OneBearing):
             "layout": self.bearing.layout.name,
             "position": self.scene.places[self.index].tolist(),
             **summary_of_bearing(self),
-            "minimum_load_ratio": float(least),
+            "displacement_used": float(self.extremes.displacement[3]) / Backbone.of(self.bearing).capacity,
+            "minimum_load_ratio": max(float(least), 0.0),  # below 0 its top plate hangs from the building
             "maximum_load_ratio": float(most),
             "verdict": self.verdict.as_dict,
             "dissipated": float(self.history.dissipated[-1]),
@@ -437,7 +440,7 @@ class BearingResult(OneBearing):
         return [
             ("bearing", f"{s['layout']} at ({x:g}, {y:g}) m"),
             *super().main_results(),
-            ("N over N at rest", f"{s['minimum_load_ratio']:.2f} to {s['maximum_load_ratio']:.2f}"),
+            ("N over N at rest", summaries.ratios_text(s)),
         ]
 
     def derived_and_groups(self) -> tuple[tuple[str, ...], dict[str, xr.Dataset]]:

@@ -143,14 +143,40 @@ def _bearings(bearings: Sequence[Mapping[str, Any]]) -> Table:
             f"{1e3 * bearing['peak_displacement']['radial']:.1f}",
             f"{1e-3 * bearing['peak_force']['radial']:.1f}",
             f"{1e-3 * bearing['axial_load']:.1f}",
-            f"{bearing['minimum_load_ratio']:.2f} ... {bearing['maximum_load_ratio']:.2f}",
-            f"{1e3 * min(bearing['minimum_gap']):.1f}",
+            ratios_text(bearing, " ... "),
+            left_text(bearing["minimum_gap"]),
+            f"{100 * bearing['displacement_used']:.0f}",
             _numbers(bearing["rims_met"]) or "-",
         )
         for bearing in bearings
     ]
-    columns = ("no.", "name", "u [mm]", "F [kN]", "N at rest [kN]", "N / N at rest", "least left [mm]", "rims")
-    return Table("peaks of bearings; left: capacity less sliding; rims: surfaces", columns, rows)
+    columns = (
+        "no.",
+        "name",
+        "u [mm]",
+        "F [kN]",
+        "N at rest [kN]",
+        "N / N at rest",
+        "least left [mm]",
+        "used [%]",
+        "rims",
+    )
+    return Table(f"peaks of bearings; {LEFT}; rims: surfaces", columns, rows)
+
+
+LEFT = "left: capacity less sliding of the surface named; used: u over the displacement at which all rims are met"
+
+
+def left_text(gaps: Sequence[float]) -> str:
+    """The least gap [mm] and its surface, counted from 1. gaps: of the surfaces, bottom first [m]."""
+    surface = int(np.argmin(gaps))
+    return f"{1e3 * gaps[surface]:.1f} of {surface + 1}"
+
+
+def ratios_text(summary: Mapping[str, Any], to: str = " to ") -> str:
+    """Least and largest axial force over the load at rest; 0 where the bearing lifts."""
+    least, most = summary["minimum_load_ratio"], summary["maximum_load_ratio"]
+    return f"{least:.2f}{' (lifts)' if least == 0 else ''}{to}{most:.2f}"
 
 
 def _uplift(bearings: Sequence[Mapping[str, Any]]) -> Table:
@@ -173,19 +199,26 @@ def _uplift(bearings: Sequence[Mapping[str, Any]]) -> Table:
 class BearingDemand:
     """Demand on one bearing.
 
-    number: from 1. name: of the bearing. peak_displacement: horizontal [m]. capacity_left: least of its surfaces [m].
-    minimum_load_ratio, maximum_load_ratio: axial force over the load at rest [-]. residual_displacement: [m]; None
+    number: from 1. name: of the bearing. peak_displacement: horizontal [m]. gaps: least of each surface, bottom first
+    [m]. displacement_used: peak_displacement over the displacement at which all rims are met [-]. minimum_load_ratio,
+    maximum_load_ratio: axial force over the load at rest [-]. residual_displacement: [m]; None
     where the bearing still moves when the run ends. dissipated: energy at the end [J].
     """
 
     number: int
     name: str
     peak_displacement: float
-    capacity_left: float
+    gaps: tuple[float, ...]
+    displacement_used: float
     minimum_load_ratio: float
     maximum_load_ratio: float
     residual_displacement: float | None
     dissipated: float
+
+    @property
+    def capacity_left(self) -> float:
+        """Capacity less sliding, the least of its surfaces [m]."""
+        return min(self.gaps)
 
 
 @dataclass(frozen=True, repr=False)
@@ -232,7 +265,8 @@ class BuildingCharacterisation(Characterisation):
                     bearing["number"],
                     bearing["name"],
                     bearing["peak_displacement"]["radial"],
-                    min(bearing["minimum_gap"]),
+                    tuple(bearing["minimum_gap"]),
+                    bearing["displacement_used"],
                     bearing["minimum_load_ratio"],
                     bearing["maximum_load_ratio"],
                     float(np.hypot(*u[-1])) if rests(result.time, u) else None,
@@ -264,13 +298,15 @@ class BuildingCharacterisation(Characterisation):
                 str(demand.number),
                 demand.name or "-",
                 f"{1e3 * demand.peak_displacement:.1f}",
-                f"{1e3 * demand.capacity_left:.1f}",
+                left_text(demand.gaps),
+                f"{100 * demand.displacement_used:.0f}",
                 yes(demand.capacity_left <= 0),
-                f"{demand.minimum_load_ratio:.2f} ... {demand.maximum_load_ratio:.2f}",
+                ratios_text(vars(demand), " ... "),
                 "moves" if (last := demand.residual_displacement) is None else f"{1e3 * last:.2f}",
                 f"{1e-3 * demand.dissipated:.1f}",
             )
             for demand in self.bearings
         ]
-        columns = ("no.", "name", "u [mm]", "left [mm]", "rim", "N / N at rest", "residual [mm]", "dissipated [kJ]")
-        return Table("bearings; left: least capacity less sliding", columns, rows)
+        columns = ("no.", "name", "u [mm]", "left [mm]", "used [%]", "rim", "N / N at rest", "residual [mm]",
+                   "dissipated [kJ]")  # fmt: skip
+        return Table(f"bearings; {LEFT}", columns, rows)

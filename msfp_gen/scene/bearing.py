@@ -140,6 +140,7 @@ class Bearing:
         _check_bounds(contract.BODY_BOUNDS, base, shown)
         for index in range(self.layout.surfaces):
             self._check_geometry(index)
+        object.__setattr__(self, "_given_at", friction_at)
         if _is_at_pivot(friction_at):
             radii, friction = zip(*((surface.radius, surface.friction) for surface in self.surfaces), strict=True)
             heights = (self.base_height, *(body.height for body in self.bodies))
@@ -208,6 +209,7 @@ class Bearing:
         friction_at = changes.pop("friction_at", "surface")
         if _is_at_pivot(friction_at) and not {"friction", "surfaces"} & changes.keys():
             raise InputError("bearing.friction_at = 'pivot': no friction coefficients are given; give friction with it")
+        kept = self.friction_given_at if not {"friction", "surfaces"} & changes.keys() else friction_at
         list_of = {column: name for name, kind in _LISTS.items() for column in _names(kind)}
         own = {name: changes.pop(name) for name in _names(Bearing) if name in changes}
         base = dataclass_replace(self, **own)
@@ -221,7 +223,14 @@ class Bearing:
             for index, value in enumerate(values):
                 with errors_at(type(items[index]).__name__.lower(), f"bearing.{list_of[column]}[{index}]"):
                     items[index] = dataclass_replace(items[index], **{column: value})
-        return dataclass_replace(base, surfaces=rows["surfaces"], bodies=rows["bodies"], friction_at=friction_at)
+        made = dataclass_replace(base, surfaces=rows["surfaces"], bodies=rows["bodies"], friction_at=friction_at)
+        object.__setattr__(made, "_given_at", kept)
+        return made
+
+    @property
+    def friction_given_at(self) -> str:
+        """Where the coefficients were given, "surface" or "pivot": factors of a bounding analysis act there."""
+        return str(vars(self)["_given_at"])
 
     @property
     def friction_at_pivot(self) -> tuple[float, ...] | None:

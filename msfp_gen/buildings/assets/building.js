@@ -46,8 +46,9 @@ function addReadout() {
       const ratio = at("ratio", frame)[index];
       swatch.style.background = loadColour(ratio);
       const texts = [
-        fixed(-top[0] * MILLI, 1), fixed(-top[1] * MILLI, 1), fixed(ratio * report.loads[index] * 1e-3, 0), fixed(ratio, 2),
-        fixed(at("left", frame)[index] * MILLI, 1),
+        fixed(-top[0] * MILLI, 1), fixed(-top[1] * MILLI, 1), fixed(ratio * report.loads[index] * 1e-3, 0),
+        ratio > 0 ? fixed(ratio, 2) : "0 (lifts)",
+        `${fixed(at("left", frame)[index] * MILLI, 1)} of ${at("left_surface", frame)[index]}`,
       ];
       cells.forEach((cell, k) => { cell.textContent = texts[k]; });
     });

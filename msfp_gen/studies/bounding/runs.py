@@ -229,9 +229,37 @@ def _bounded_bearing(bearing: Bearing, law: Law | None, *, table: FactorTable, c
             "proportional; give a formula of the form mu * (...)"
         )
     for name, factors in lambdas.items():
-        for field in PROPERTIES[name]:
-            bearing = _scaled(bearing, field, factors[case])
+        if name == "friction":
+            bearing = _with_friction(bearing, factors[case])
+        else:
+            for field in PROPERTIES[name]:
+                bearing = _scaled(bearing, field, factors[case])
     return bearing
+
+
+def _with_friction(bearing: Bearing, factors: tuple[float, ...]) -> Bearing:
+    """The bearing with its coefficients multiplied where the scene gives them, at the surfaces or at the pivot.
+
+    A second coefficient of a friction law takes the factor of the first, so that the law is multiplied as a whole.
+    """
+    if bearing.friction_given_at == "pivot":
+        sheet = [mu * factor for mu, factor in zip(_given_friction(bearing), factors, strict=True)]
+        changed = bearing.replace(friction=sheet, friction_at="pivot")
+        pairs = zip(changed.surfaces, bearing.surfaces, strict=True)
+        factors = tuple(new.friction / old.friction if old.friction else 1.0 for new, old in pairs)
+    else:
+        changed = _scaled(bearing, "friction", factors)
+    for field in PROPERTIES["friction"][1:]:
+        changed = _scaled(changed, field, factors)
+    return changed
+
+
+def _given_friction(bearing: Bearing) -> tuple[float, ...]:
+    """The coefficients where they were given, bottom first [-]."""
+    sheet = bearing.friction_at_pivot
+    if bearing.friction_given_at == "pivot" and sheet is not None:
+        return sheet
+    return tuple(surface.friction for surface in bearing.surfaces)
 
 
 def _typical(scene: System) -> Bearing:
@@ -337,16 +365,18 @@ def _factor_table(table: FactorTable) -> Table:
 
 
 def _lambda_table(bounds: Bounds) -> Table:
-    nominal = bounds.bearing.surfaces
-    rows = [
-        (
-            f"{name} {surface + 1}",
-            *(f"{factors[case][surface]:.4g}" for case in CASES),
-            *(f"{factors[case][surface] * getattr(nominal[surface], name):.4g}" for case in CASES),
-        )
-        for name, factors in bounds.lambdas.items()
-        for surface in range(len(nominal))
-    ]
+    bearing = bounds.bearing
+    at = " at the pivot" if bearing.friction_given_at == "pivot" else ""
+    rows = []
+    for name, factors in bounds.lambdas.items():
+        nominal = [getattr(surface, name) for surface in bearing.surfaces]
+        if name == "friction":
+            nominal = list(_given_friction(bearing))
+        label = f"{name}{at if name == 'friction' else ''}"
+        for surface, value in enumerate(nominal):
+            lambdas = [factors[case][surface] for case in CASES]
+            cells = [f"{number:.4g}" for number in (*lambdas, *(value * factor for factor in lambdas))]
+            rows.append((f"{label} {surface + 1}", *cells))
     return Table("lambda of every surface, and property times lambda [SI]", ("", *CASES, *CASES), rows)
 
 

@@ -25,7 +25,7 @@ from msfp_gen.results.loops import ForcePath as Motions
 from msfp_gen.results.note import Note
 from msfp_gen.results.quantities import quantities
 from msfp_gen.results.summary import summary_of_bearing
-from msfp_gen.scene.fidelity import at_fidelity
+from msfp_gen.scene.fidelity import Backbone, at_fidelity
 
 
 def test_the_note_of_a_cheaper_model_is_read_from_the_file(tmp_path: Path):
@@ -330,3 +330,32 @@ def test_a_doubt_about_a_shared_bearing_is_one_note() -> None:
     first, second = _shared([*values, other])
     assert first.text == doubt.format(1e6 + 1) + "; the same holds for 69 other bearings" and first.bearing == 1
     assert second == other
+
+
+def test_what_is_left_names_its_surface_and_what_is_used_is_of_the_bearing():
+    """The least gap may be of an inner surface while the dishes have more left."""
+    run = pushed()
+    for one, demand in zip(run.bearings, run.characterise().bearings, strict=True):
+        gaps = one.extremes.gap
+        surface, capacity = int(gaps.argmin()), Backbone.of(one.bearing).capacity
+        used = float(one.extremes.displacement[3]) / capacity
+        for table, column in (
+            (run.part_tables()[-1], "least left [mm]"),
+            (run.characterise().demand_table(), "left [mm]"),
+        ):
+            row = table.rows[one.index]
+            assert row[table.columns.index(column)] == f"{1e3 * gaps[surface]:.1f} of {surface + 1}"
+            assert row[table.columns.index("used [%]")] == f"{100 * used:.0f}"
+        assert demand.capacity_left == gaps.min() and demand.displacement_used == used
+
+
+def test_a_bearing_that_lifts_has_no_tension():
+    """Below a bearing that is open hangs its top plate; that is no pull of the bearing."""
+    run = pushed()
+    least = run.extremes.axial_force.copy()
+    least[1, 0] = -500.0
+    lifted = replace(run, extremes=replace(run.extremes, axial_force=least))
+    assert lifted.summary["minimum_load_ratio"] == lifted.bearings[1].summary["minimum_load_ratio"] == 0.0
+    assert dict(lifted.main_results())["N over N at rest"].startswith("0.00 (lifts) to ")
+    texts = [row[lifted.part_tables()[-1].columns.index("N / N at rest")] for row in lifted.part_tables()[-1].rows]
+    assert texts[1].startswith("0.00 (lifts) ... ") and "lifts" not in texts[0]

@@ -37,7 +37,8 @@ from msfp_gen.figures.style import COLOURS, distinct
 from msfp_gen.results.quantities import quantities
 from msfp_gen.scene.file.loader import scene_text
 from msfp_gen.studies.bounding import CASES, Bounds, bound, bounded_scenes, factor_tables, load_factors
-from msfp_gen.studies.bounding.runs import _scaled, plot_bounds
+from msfp_gen.studies.bounding.factors import _read
+from msfp_gen.studies.bounding.runs import _scaled, bounded_scene, bounding_tables, plot_bounds
 
 ASCE = ((1 + 0.75 * 0) * 0.7 * 0.85, (1 + 0.75 * (1.3 * 1.2 - 1)) * 1.3 * 1.15)
 
@@ -418,6 +419,42 @@ def test_a_suite_with_a_failed_run_has_no_mean(upper_fails: None, tmp_path: Path
     assert "error: 2 runs did not reach their end; the first: ridgecrest-2019-ci-clc, upper: " in error
     assert len((out / "suite.csv").read_text().splitlines()) == 1 and (out / "suite.png").is_file()
     assert (out / "records.csv").read_text().count("jammed") == 2
+
+
+def test_factors_act_at_the_pivot_where_the_scene_gives_friction_there() -> None:
+    """A factor of the inner surfaces alone changes the moment that they give to the outer ones."""
+    table = _read("inner", {
+        "rule": "asce7", "factor": [{"property": "friction", "surfaces": [2, 3], "direct": {"test": [0.5, 2.0]}}],
+    })  # fmt: skip
+    given = [0.05, 0.02, 0.03, 0.09]
+    scene = load_scene("fenz-test1")
+    at_pivot = dataclasses.replace(scene, bearing=scene.bearing.replace(friction=given, friction_at="pivot"))
+    wanted = scene.bearing.replace(friction=[0.05, 0.04, 0.06, 0.09], friction_at="pivot")
+    found = bounded_scene(at_pivot, table, "upper").bearing
+    assert [s.friction for s in found.surfaces] == pytest.approx([s.friction for s in wanted.surfaces], rel=1e-12)
+    assert found.friction_at_pivot == pytest.approx([0.05, 0.04, 0.06, 0.09], rel=1e-12)
+    at_surface = dataclasses.replace(scene, bearing=scene.bearing.replace(friction=given))
+    found = bounded_scene(at_surface, table, "upper").bearing
+    assert [s.friction for s in found.surfaces] == pytest.approx([0.05, 0.04, 0.06, 0.09], rel=1e-12)
+    moved = at_pivot.bearing.replace(gravity=9.81)
+    assert moved.friction_given_at == "pivot" and moved.replace(friction=given).friction_given_at == "surface"
+    lambdas = next(t for t in bounding_tables(bound(at_pivot, table)) if "lambda of every" in t.title)
+    assert lambdas.rows[1] == ("friction at the pivot 2", "0.5", "1", "2", "0.01", "0.02", "0.04")
+    assert lambdas.rows[0][-1] == "0.05"
+
+
+def test_a_factor_at_the_pivot_multiplies_a_law_as_a_whole() -> None:
+    table = _read("inner", {
+        "rule": "asce7", "factor": [{"property": "friction", "surfaces": [2, 3], "direct": {"test": [0.5, 2.0]}}],
+    })  # fmt: skip
+    scene = load_scene("fenz-test1")
+    law = {"friction_slow": [0.02, 0.01, 0.01, 0.04], "velocity_rate": 20.0}
+    bearing = scene.bearing.replace(friction=[0.05, 0.02, 0.03, 0.09], friction_at="pivot").replace(**law)
+    scene = dataclasses.replace(scene, bearing=bearing, effects=Auto())
+    found = bounded_scene(scene, table, "upper").bearing
+    for new, old in zip(found.surfaces, bearing.surfaces, strict=True):
+        assert new.friction_slow / old.friction_slow == pytest.approx(new.friction / old.friction, rel=1e-12)
+    assert found.surfaces[0].friction > 1.01 * bearing.surfaces[0].friction
 
 
 def test_a_run_that_met_its_stop_condition_is_none_of_a_mean(tmp_path: Path, capsys: Any) -> None:
