@@ -116,7 +116,7 @@ def schedule_context(equations: Equations, directional: Iterable[Kernel], by_end
         check_by_ends(equations, forms["by_ends"].kernels)
     every = {**balances, **with_directions, **port}
     return {
-        "parts": [_part(name, passes, programs, forms) for name, passes in every.items()],
+        "parts": [part(name, passes, programs, forms) for name, passes in every.items()],
         "directed": list(with_directions),
         "of_ends": list(of_ends),
         "blocks": [_declared(LISTS[name], equations) for name in used if LISTS[name].kept is Kept.HERE],
@@ -191,7 +191,8 @@ def _at_hand(call: Call) -> bool:
     return call.by is None and not call.adds and len(call.writes) == 1 and list_of(call.writes[0]).kept is Kept.WORK
 
 
-def _part(name: str, passes: Iterable[Pass], programs: Programs, directional: Mapping[str, Form]) -> dict[str, Any]:
+def part(name: str, passes: Iterable[Pass], programs: Programs, directional: Mapping[str, Form]) -> dict[str, Any]:
+    """A part of a schedule for the templates: its passes, each with its lines, for values and for derivatives."""
     calls = list(calls_of(passes))
     forms: dict[str, Lines] = {"values": _values, "tangents": _tangents}
     forms |= {key: partial(_directions, form=form) for key, form in directional.items() if _has(calls, form)}

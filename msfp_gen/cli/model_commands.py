@@ -52,14 +52,26 @@ def generate(
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Write the module, its sources and a README there."),
     ] = None,
+    alone: Annotated[
+        bool,
+        typer.Option("--equations", help="With -o: the derived equations alone, to be read; without integration."),
+    ] = False,
     *,
     effects: Effects,
 ) -> None:
     """Derive and compile the equations of a stack layout (a library for C and Fortran: export)."""
     spec = ModelSpec(Layout(n, m, p), effects)
+    from msfp_gen.embedding.alone import write_alone
     from msfp_gen.embedding.library import check_guide, write_guide
     from msfp_gen.jit.build import build_table, generate_to, prepare
 
+    if alone:
+        if output is None:
+            raise InputError("--equations: give the folder for them, -o DIR")
+        info = write_alone(spec, output)
+        show([build_table(info)])
+        note(f"start with {info.folder / 'README.md'}")
+        return
     if output is not None:
         check_guide(output)
     with building() as progress:

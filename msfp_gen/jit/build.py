@@ -123,9 +123,15 @@ def generate_to(spec: ModelSpec, folder: Path | str, progress: Progress | None =
 
     """
     target = Path(folder).absolute()
-    replaceable = _replaceable_files(target, cache.module_name(spec))
+    replaceable = replaceable_files(target, cache.module_name(spec))
     info = prepare(spec, progress, portable=True)
     manifest = cache.Manifest.read(info.folder)
+    copy_module(info.folder, manifest, target, replaceable)
+    return replace(info, path=target / manifest.extension, folder=target)
+
+
+def copy_module(source: Path, manifest: cache.Manifest, target: Path, replaceable: set[str]) -> None:
+    """Copy what a manifest lists into `target`; see `generate_to`. replaceable: files there that may be replaced."""
     files = [cache.MANIFEST_NAME, *sorted(set(manifest.files) - {manifest.extension}), manifest.extension]
     if foreign := [name for name in files if name not in replaceable and (target / name).exists()]:
         raise InputError(
@@ -134,8 +140,7 @@ def generate_to(spec: ModelSpec, folder: Path | str, progress: Progress | None =
     with cache.write_errors(target, "output folder"):
         target.mkdir(parents=True, exist_ok=True)
         for name in files:
-            _replace(info.folder / name, target / name)
-    return replace(info, path=target / manifest.extension, folder=target)
+            _replace(source / name, target / name)
 
 
 def load_extension(path: Path, module: str) -> ModuleType:
@@ -259,7 +264,7 @@ def _build(spec: ModelSpec, entry: cache.Entry, folder: Path, notify: Progress) 
     return manifest
 
 
-def _replaceable_files(target: Path, module: str) -> set[str]:
+def replaceable_files(target: Path, module: str) -> set[str]:
     """Names of the files in `target` that msfp-gen wrote and may replace.
 
     Raises InputError if `target` is a file, holds files without a manifest, or holds another model.

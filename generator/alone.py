@@ -1,0 +1,235 @@
+"""The derived equations alone: kinematics, balances and condensed residual with their Jacobians, without the runtime.
+
+The same programs and the same drivers as in a full model, in one file that loops over bodies and surfaces. Everything
+that is given is one row of numbers, z; a Jacobian has a column for each of them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from math import prod
+from time import perf_counter
+from typing import Any
+
+from msfp_gen.common.version import __version__
+from msfp_gen.specification import contract
+from msfp_gen.specification.layout import ModelSpec
+
+from . import Generated
+from .derive import Equations, derive
+from .drivers import part
+from .emit import function
+from .interface import effects_text, environment, surface_values
+from .lower import lower
+from .program import Block, Program
+from .schedule import (
+    COLUMNS,
+    LISTS,
+    Call,
+    Kept,
+    List,
+    Over,
+    Pass,
+    condensed,
+    momentum_balances,
+    passes_of,
+    unknowns,
+)
+
+WIDTH = 8  # columns of a Jacobian that are computed at once
+FILES = ("kernels.h", "equations.h", "equations.c")
+AXES = ("x", "y", "z")
+ANGLES = ("psi", "theta", "phi")
+MADE = ("body_block", "surface_block", "top_block", "spring_stage", "named_points")  # not part of a schedule
+
+
+def module_name(spec: ModelSpec) -> str:
+    """Name of the Python module."""
+    return f"equations_{spec.layout.name}"
+
+
+def given(spec: ModelSpec) -> dict[str, tuple[int, ...]]:
+    """What z holds: name -> shape."""
+    count = spec.layout.surfaces
+    shapes = {**dict.fromkeys("qva", (count, 3)), **dict.fromkeys("hg", (count, 2)), "contact": (count, 3)}
+    return {**shapes, "base": (3, 6), "load": (6,)}
+
+
+class _Layout:
+    """Where each number lies: all blocks of an evaluation are one array, one list after the other."""
+
+    def __init__(self, equations: Equations, lists: Iterable[List]) -> None:
+        self.equations, self.lists, self.starts = equations, list(lists), dict[str, int]()
+        count, total = equations.spec.layout.surfaces, 0
+        self.lengths = {"": 1, "MSFP_NB": count, "MSFP_NB + 1": count + 1}
+        for one in self.lists:
+            self.starts[one.name] = total
+            total += self.lengths[one.length] * len(self.block(one).fields)
+        self.total = total
+
+    def block(self, one: List) -> Block:
+        block: Block = getattr(self.equations.blocks, one.kind)
+        return block
+
+    def place(self, name: str, index: int, entry: str) -> int:
+        """Place of a number; -1 where the model has none, as E2 in the plane."""
+        names = [field.name for field in self.block(LISTS[name]).fields]
+        return self.starts[name] + index * len(names) + names.index(entry) if entry in names else -1
+
+    def given(self) -> Iterator[tuple[int, int]]:
+        """Both places of every number of z; the state of friction is read in two lists."""
+        surfaces = range(self.equations.spec.layout.surfaces)
+        for order in ("", "1", "2"):
+            yield from ((self.place("x", j + 1, f"{angle}{order}"), -1) for j in surfaces for angle in ANGLES)
+        for name in ("friction", "shear"):
+            other = "stage" if name == "friction" else ""
+            for j in surfaces:
+                yield from (
+                    (self.place(name, j, entry), self.place(other, j, entry) if other else -1) for entry in ("Y", "Z")
+                )
+        yield from ((self.place("unknowns", j, entry), -1) for j in surfaces for entry in ("psi", "theta", "N"))
+        for letter, order in zip("CVA", ("", "1", "2"), strict=True):
+            yield from ((self.place("frame", 0, f"{letter}{axis}"), -1) for axis in AXES)
+            yield from ((self.place("x", 0, f"{angle}{order}"), -1) for angle in ANGLES)
+        for name, letter in (("load_force", "F"), ("load_moment", "M")):
+            yield from ((self.place(name, 0, f"{letter}{axis}"), -1) for axis in AXES)
+
+    def results(self) -> dict[str, list[int]]:
+        """Places of the rows of both forms, and of rotations, body by body."""
+        layout, blocks = self.equations.spec.layout, self.equations.blocks
+        surfaces = range(layout.surfaces)
+        rates = [entry.name for entry in blocks.friction.fields]
+        rows = [self.place("balances", j + 1, entry.name) for j in surfaces for entry in blocks.balances.fields]
+        rows += [self.place("report_contact", j, f"d{name}") for j in surfaces for name in rates]
+        moments = [entry.name for entry in blocks.angular.fields][: len(self.equations.unknown_angles)]
+        left = [self.place("angular", j + 1, entry) for j in surfaces for entry in moments]
+        left += [self.place("contact", j, f"d{name}") for j in surfaces for name in rates]
+        left += [self.place("contact", j, "N") for j in surfaces]
+        turning = [
+            self.place("body", k, f"{name}{axis}")
+            for k in range(layout.n)
+            for name in ("w", "wp", "al", "alp", "t1", "t2", "t3")
+            for axis in AXES
+        ]
+        return {"balances": rows, "condensed": left, "rotations": turning}
+
+
+def _schedules(spec: ModelSpec) -> dict[str, tuple[Pass, ...]]:
+    """Both forms as passes without what C of the runtime solves: friction is given, as its state h and its force g."""
+
+    def alone(passes: Iterable[Pass]) -> Iterator[Pass]:
+        for one in passes:
+            calls = tuple(
+                replace(call, by=None if call.program == "contact" else call.by)
+                for call in one.calls
+                if call.program not in ("foot", "contact_stage")
+            )
+            if calls:
+                yield Pass(Over.SURFACES if one.over is Over.TOGETHER else one.over, calls)
+
+    forms = {"balances": momentum_balances(spec.effects), "condensed": condensed(spec.effects)}
+    return {name: tuple(alone(passes_of(schedule))) for name, schedule in forms.items()}
+
+
+def _calls(schedules: Mapping[str, tuple[Pass, ...]]) -> list[Call]:
+    return [call for passes in schedules.values() for one in passes for call in one.calls]
+
+
+def _programs(equations: Equations, called: set[str]) -> list[Program]:
+    """The programs with one number of columns, and the state of friction among what they are differentiated by."""
+    chosen = []
+    for program in equations.programs:
+        if program.name in called | set(MADE):
+            inputs = [
+                replace(use, active=frozenset({"Y", "Z"}) & {f.name for f in use.block.fields}, moving=True)
+                if program.name == "contact" and use.alias == "h"
+                else use
+                for use in program.inputs
+            ]
+            columns = COLUMNS if program.tangents else ""
+            chosen.append(replace(program, inputs=inputs, columns=columns, lanes=""))
+    return chosen
+
+
+def _plain(text: str) -> str:
+    """C of a driver in terms of the blocks s and their derivatives ds alone."""
+    text = re.sub(r"msfp_rim_force\(p, w, j, .*\);", "rim_force(p, s, j);", text)
+    text = re.sub(r"\bw->d(?=(?:x|body|force|moment)\b)", "ds->", text)
+    return re.sub(r"\bw->", "s->", text)
+
+
+def equations_alone(spec: ModelSpec, example: Any) -> Generated:
+    """The files of the equations alone. example: values of a bearing for the README.
+
+    There is no vertical spring of the top. Without uplift, a rotating top and friction laws.
+    """
+    begin = perf_counter()
+    effects = spec.effects
+    assert not (effects.uplift or effects.top_rotation or effects.law), spec
+    equations = derive(spec)
+    schedules = _schedules(spec)
+    calls = _calls(schedules)
+    used = {place.partition("[")[0] for call in calls for place in (*call.reads, *call.writes)} | {"shear", "stage"}
+    lists = [one for name, one in LISTS.items() if name in used and one.kept is not Kept.PARAMETERS]
+    parts = _Layout(equations, lists)
+    programs = _programs(equations, {name for call in calls for name in call.programs})
+    by_name = {program.name: program for program in programs}
+    kernels = [lower(program) for program in programs]
+    blocks = {use.block.name: use.block for program in programs for use in (*program.inputs, program.output) if use}
+    drivers = [part(name, passes, by_name, {}) for name, passes in schedules.items()]
+    names = {kind: i for i, kind in enumerate(given(spec))}
+    sizes = [prod(shape) for shape in given(spec).values()]
+    starts = [sum(sizes[:i]) for i in range(len(sizes))]
+    context = {
+        "version": __version__,
+        "spec": spec,
+        "layout": spec.layout,
+        "effects": effects_text(spec),
+        "module": module_name(spec),
+        "blocks": list(blocks.values()),
+        "lists": [(one.name, parts.block(one).name, one.length) for one in lists],
+        "functions": [function(kernel) for kernel in kernels],
+        "drivers": drivers,
+        "plain": _plain,
+        "width": WIDTH,
+        "places": list(parts.given()),
+        "given": [(name, shape, starts[names[name]]) for name, shape in given(spec).items()],
+        "total": sum(sizes),
+        "results": parts.results(),
+        "unknowns": [_in_z(*unknown, dict(zip(names, starts, strict=True))) for unknown in unknowns(spec)],
+        "points": _points(equations),
+        "rows": {"friction": len(equations.blocks.friction.fields), "moments": len(equations.unknown_angles)},
+        "values": {"body": contract.BODY, "surface": surface_values(spec), "top": contract.TOP},
+        "example": example,
+    }
+    templates = environment()
+    names_of = {name: f"alone_{name}" for name in (*FILES, "README.md", "setup.py")}
+    names_of |= {f"{module_name(spec)}.pyx": "alone.pyx"}
+    files = {
+        name: _renamed(templates.get_template(f"{template}.jinja").render(context, file=name))
+        for name, template in names_of.items()
+    }
+    statements = sum(len(k.values) + len(k.partials) + len(k.tangents) for k in kernels)
+    operations = sum(k.operations + k.tangent_operations for k in kernels)
+    return Generated(files, statements, operations, {"derive and emit": perf_counter() - begin})
+
+
+def _renamed(text: str) -> str:
+    """Without the prefix of a full model."""
+    return text.replace(COLUMNS, "COLUMNS").replace("MSFP_NB", "NB")
+
+
+def _in_z(kind: str, index: int, entry: int, starts: Mapping[str, int]) -> int:
+    """Place in z of an unknown (2.119): an acceleration of a body, or an entry of a contact."""
+    if kind == "coordinate":
+        return starts["a"] + (index - 1) * 3 + entry - 6
+    return starts["contact"] + index * 3 + entry
+
+
+def _points(equations: Equations) -> list[int]:
+    """Index in the block of named points of each of (4 points, 3 orders, 3 axes); -1: zero."""
+    names = [entry.name for entry in equations.blocks.points.fields]
+    wanted = [f"{order}_{point}{axis}" for point in ("lo", "cm", "up", "sc") for order in "rva" for axis in AXES]
+    return [names.index(name) if name in names else -1 for name in wanted]
