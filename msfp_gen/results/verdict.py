@@ -20,16 +20,20 @@ from msfp_gen.scene.scene_fields import Limits
 
 RIM_SHARE = 1 / 3  # rim force over the axial load, up to which the spring of a rim was compared
 COMPRESSION_SHARE = 0.1  # compression of a rim over the capacity of its surface
+IN_ROWS = 0.02  # share by which the largest value of the rows may miss one over all steps, of which it has the time
+ROUNDING = 1e-10  # of a value, relative
 OF_WHOLE = ("axial_load", "displacement")  # limits of a whole bearing, not of its surfaces
 NO_SURFACES = "the surfaces are not judged: the run has one pendulum in their place"
 SCALES = {"N": (1e-3, "kN"), "m": (1e3, "mm")}  # unit -> factor and unit of texts
 
 
 class Value(NamedTuple):
-    """What was reached: surface from 1, 0: none; time [s]; the value and what is allowed, in the unit of the limit."""
+    """What was reached: surface from 1, 0: none; time [s], None: not known; the value and what is allowed, in the unit
+    of the limit. All are of one instant.
+    """
 
     surface: int
-    time: float
+    time: float | None
     reached: float
     allowed: float
 
@@ -63,8 +67,8 @@ class Reading:
 
     @property
     def exceeded(self) -> bool:
-        """Whether the value is beyond the limit."""
-        return self.value.reached > self.value.allowed
+        """Whether the value is beyond the limit, by more than rounding."""
+        return self.value.reached > self.value.allowed * (1 + ROUNDING)
 
     @property
     def share(self) -> float:
@@ -154,7 +158,7 @@ class Verdict:
         limit, (_, time, reached, allowed) = reading.limit, reading.value
         others = len({one.bearing for one in self.exceeded if one.limit.key == limit.key}) - 1
         more = f", and {others} other bearing{'s' * (others > 1)}" if others > 0 else ""
-        where = ", ".join(filter(None, [reading.place, f"{time:.4g} s"]))
+        where = ", ".join(filter(None, [reading.place, "" if time is None else f"{time:.4g} s"]))
         return f"{limit.name} {limit.shown(reached)}, limit {limit.shown(allowed)} ({where}{more})"
 
     @property
@@ -163,7 +167,7 @@ class Verdict:
         rows = []
         for reading in self.worst.values():
             limit, (_, time, reached, allowed) = reading.limit, reading.value
-            when = f"{time:.4g}" if reached else "-"
+            when = f"{time:.4g}" if reached and time is not None else "-"
             beyond = "EXCEEDED" if reading.exceeded else "within"
             place = (reading.place or "-") if reached else "-"
             rows.append((limit.name, limit.shown(reached), limit.shown(allowed), place, when, beyond))
@@ -210,11 +214,16 @@ def verdict_of(
 
 
 def _by_surface(one: BearingData, rows: Array, reached: Array, allowed: Array | float) -> Iterator[Value]:
-    """Values of every surface. rows: shape (T, n-1), of which the largest has the time."""
-    times = one.history.time[rows.argmax(axis=0)]
+    """Values of every surface. rows: of the same quantity, shape (T, n-1)."""
     allowed = np.broadcast_to(allowed, reached.shape)
-    for surface, (time, value, most) in enumerate(zip(times, reached, allowed, strict=True), start=1):
-        yield Value(surface, float(time), float(value), float(most))
+    for surface, (own, value, most) in enumerate(zip(rows.T, reached, allowed, strict=True), start=1):
+        yield Value(surface, _time_of(one, own, float(value)), float(value), float(most))
+
+
+def _time_of(one: BearingData, rows: Array, value: float) -> float | None:
+    """The time of the row with the largest value, shape (T,); None where the rows do not have what was reached."""
+    row = int(rows.argmax())
+    return float(one.history.time[row]) if rows[row] >= (1 - IN_ROWS) * value else None
 
 
 def _rim_force(one: BearingData, limits: Limits) -> Iterator[Value]:
@@ -241,10 +250,24 @@ def _rims_are_modelled(one: BearingData) -> bool:
 
 
 def _travel(one: BearingData, limits: Limits) -> Iterator[Value]:
-    """Rims in contact at one time; one surface must be left to slide."""
-    met = ((one.history.gap <= 0) | (one.history.rim_force > 0)).sum(axis=1)
-    row = int(met.argmax())
-    yield Value(0, float(one.history.time[row]), float(met[row]), float(len(one.extremes.gap) - 1))
+    """Rims in contact at one time; one surface must be left to slide.
+
+    By the contacts that the run has located, of a building by the rows.
+    """
+    allowed = float(len(one.extremes.gap) - 1)
+    closed = (one.history.gap <= 0) | (one.history.rim_force > 0)
+    counts = closed.sum(axis=1)
+    row = int(counts.argmax())
+    most, time = int(counts[row]), float(one.history.time[row])
+    met = {int(surface) + 1 for surface in np.flatnonzero(closed[0])}
+    for event in one.events:
+        if event.kind == "rim_contact":
+            met.add(event.surface)
+        elif event.kind == "rim_release":
+            met.discard(event.surface)
+        if len(met) > most or (len(met) == most and event.time < time):
+            most, time = len(met), event.time
+    yield Value(0, time, float(most), allowed)
 
 
 def _uplift_height(one: BearingData, limits: Limits) -> Iterator[Value]:
@@ -263,14 +286,17 @@ def _uplift_duration(one: BearingData, limits: Limits) -> Iterator[Value]:
 
 
 def _temperature(one: BearingData, limits: Limits) -> Iterator[Value]:
-    """Temperatures of the friction law, or of the monitor of heat where the law has none."""
+    """Temperatures of the friction law, or of the monitor of heat where the law has none.
+
+    The monitor does not keep when its largest rise was reached; the time of its note is that of the first one.
+    """
     reached, rows = one.extremes.temperature, one.history.temperature
     if reached is not None and rows is not None:
         yield from _by_surface(one, rows, reached, limits.temperature)
     for note in one.notes:
         if note.kind == "heat" and not note.action:
             start = float(start_temperatures(one.bearing)[note.surface - 1])
-            yield Value(note.surface, note.time, start + note.value, limits.temperature)
+            yield Value(note.surface, None, start + note.value, limits.temperature)
 
 
 def _of_bearing(one: BearingData, limits: Limits, name: str) -> Iterator[Value]:
@@ -281,18 +307,15 @@ def _of_bearing(one: BearingData, limits: Limits, name: str) -> Iterator[Value]:
         "displacement": (history.horizontal, extremes.displacement[3]),
     }[name]
     if (allowed := getattr(limits, name)) is not None:
-        yield Value(0, float(history.time[rows.argmax()]), float(reached), allowed)
+        yield Value(0, _time_of(one, rows, float(reached)), float(reached), allowed)
 
 
-def _noted(kind: str, allowed: Callable[[Bearing, int], float]) -> Reader:
-    """A limit of the model whose monitor leaves a note; without one nothing is read."""
-
-    def read(one: BearingData, limits: Limits) -> Iterator[Value]:
-        for note in one.notes:
-            if note.kind == kind and not note.action:
-                yield Value(note.surface, note.time, note.value, allowed(one.bearing, note.surface))
-
-    return read
+def _beyond_rim(one: BearingData, limits: Limits) -> Iterator[Value]:
+    """The largest sliding beyond a capacity that the monitor of rims noted, and its row."""
+    for note in one.notes:
+        if note.kind == "rims" and not note.action:
+            row = int(one.history.gap[:, note.surface - 1].argmin())
+            yield Value(note.surface, float(one.history.time[row]), note.value, 0.0)
 
 
 def _radius(bearing: Bearing, surface: int) -> float:
@@ -304,7 +327,9 @@ def _face(one: BearingData, limits: Limits) -> Iterator[Value]:
     """Distances as a bearing of a building records them, or as the note of a bearing alone states them."""
     offsets, times = one.extremes.contact_offset, one.extremes.contact_time
     if offsets is None or times is None:
-        yield from _noted("footprint", _radius)(one, limits)
+        for note in one.notes:  # its time is that of its value
+            if note.kind == "footprint" and not note.action:
+                yield Value(note.surface, note.time, note.value, _radius(one.bearing, note.surface))
         return
     for surface, (offset, time) in enumerate(zip(offsets.tolist(), times.tolist(), strict=True), start=1):
         if (radius := _radius(one.bearing, surface)) > 0:  # else no face is known
@@ -315,7 +340,7 @@ LIMITS = (
     Limit("rim_force", "rim force", "N", _rim_force),
     Limit("rim_compression", "rim compression", "m", _rim_compression),
     Limit("travel", "rims met at one time", "", _travel),
-    Limit("beyond_rim", "sliding beyond a rim that the model leaves out", "m", _noted("rims", lambda *_: 0.0)),
+    Limit("beyond_rim", "sliding beyond a rim that the model leaves out", "m", _beyond_rim),
     Limit("uplift_height", "opening of a surface", "m", _uplift_height),
     Limit("uplift_duration", "time for which a surface is open", "s", _uplift_duration),
     Limit("face", "contact off the axis of the slider", "m", _face),
