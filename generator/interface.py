@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from msfp_gen.specification.layout import ModelSpec
     from msfp_gen.specification.values import Bound
 
-ABI_VERSION = 2
+ABI_VERSION = 3
 CALL_ERRORS = (  # what calls return beside the statuses of a run: name, meaning and remedy
     ("argument", "an argument is missing or out of range; `message` names it"),
     ("snapshot", "these bytes are no snapshot of this model with these inputs by this build"),

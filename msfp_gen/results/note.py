@@ -47,6 +47,8 @@ _MAX_VELOCITY = RANGES["v"][-1]
 TEXTS = {
     "rims": "a slider is {most}{value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
     "uplift": "the normal force of surface {surface} is {value:.4g} N; contacts of the model are rigid and cannot open",
+    "footprint": "the normal force of surface {surface} acts {most}{value:.3g} m from the axis of its slider, outside the "
+    "face, and the slider of the model cannot tip",
     "inertia": "the inertial force of body {body} is {most}{value:.2g} of N on surface {surface}; the model has none",
     "heat": "friction may heat surface {surface} by {most}{value:.3g} K; its friction law does not depend on "
     "temperature",
@@ -62,6 +64,7 @@ TEXTS = {
 CONSEQUENCES = {
     "rims": "a rim would stop it with a force that is missing here: give effects.rims = true",
     "uplift": "the bearing may lift off, and forces are wrong where it does: give effects.uplift = true",
+    "footprint": "a real slider would tip: give effects.uplift = true",
     "inertia": "forces are wrong by about that share of N: give effects.sliders = 'inertial'",
     "heat": "friction is then some {softening:.0%} lower than here: give effects.friction = 'pvt'",
     "law_speed": "friction at such velocities is extrapolated",
@@ -85,7 +88,7 @@ IMPORTANCE = (
     ),
 )
 """Kinds of notes, those first that question most of the results."""
-RISING = ("rims", "inertia", "heat", "law_speed")
+RISING = ("rims", "footprint", "inertia", "heat", "law_speed")
 """Kinds of notes with one limit, from above."""
 
 

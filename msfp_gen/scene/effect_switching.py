@@ -30,13 +30,14 @@ if TYPE_CHECKING:
 REQUIRED_EFFECTS: dict[str, dict[str, object]] = {
     "rims": {"rims": True},
     "uplift": {"uplift": True, "sliders": "inertial"},
+    "footprint": {"uplift": True, "sliders": "inertial"},
     "inertia": {"sliders": "inertial"},
     "heat": {"friction": "pvt"},
     "plane": {"dimension": "spatial"},
 }
 JAM_STATUSES = ("newton", "step", "irregular")
 """Failures that another model may avoid: inertia and compliant contacts make the equations regular."""
-MONITORS = ("rims", "uplift", "inertia", "heat")
+MONITORS = ("rims", "uplift", "footprint", "inertia", "heat")
 
 
 class Requested(Protocol):
@@ -131,7 +132,7 @@ def _extended(scene: Requested, effects: Effects, name: str) -> Effects | None:
     None where the scene fixes one of them, the method does not support it, or the model has them already.
     """
     requested = scene.effects
-    if not isinstance(requested, Auto) or (name == "uplift" and scene.solver.method == "dopri5"):
+    if not isinstance(requested, Auto) or ("uplift" in REQUIRED_EFFECTS[name] and scene.solver.method == "dopri5"):
         return None
     if name == "heat" and effects.friction != "pv":  # the surfaces have no thermal parameters
         return None
@@ -167,6 +168,7 @@ def monitor_options(
     left_out = {
         "rims": not effects.rims,
         "uplift": "uplift" in (*stops, *noted) and not effects.uplift,
+        "footprint": not effects.uplift and stack,
         "inertia": effects.sliders == "massless" and stack,
         "heat": not heats and stack,
     }

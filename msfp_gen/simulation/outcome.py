@@ -12,7 +12,6 @@ import numpy as np
 from msfp_gen.common.version import __version__
 from msfp_gen.model.compiled import Run
 from msfp_gen.model.model import Model
-from msfp_gen.results.geometry import contact_offsets
 from msfp_gen.results.history import Event, Extremes, History
 from msfp_gen.results.note import Note, monitor_notes
 from msfp_gen.results.sliding import intervals, sliding_surfaces
@@ -120,7 +119,6 @@ def _state(scene: Scene, model: Model, run: Run) -> str:
 
 ENERGY_LIMIT = 0.02  # error of the energy closure, over the largest term, above which a note is written
 DAMPING_LIMIT = 0.01  # energy dissipated by contact damping, over that dissipated by friction, likewise
-FOOTPRINT_LOAD = 0.05  # N over its median above which the contact position is checked against the face of the slider
 LANDINGS, LANDING_TIME = 20, 0.1  # landings of a surface within a time [s] above which a note is written
 TOLERANCE_LIMIT = 0.05  # force of the top's spring at the tolerance of angles, over the peak force, likewise
 VIBRATION_LIMIT = 0.001  # estimated error by vibrations of a stuck mass, over the peak force, likewise
@@ -145,8 +143,6 @@ TEXTS = {
     "give a smaller contact_damping",
     "creep": "the displacement that remains may be wrong by {value:.3g} m or more, by which surfaces moved while none "
     "slid: Bouc-Wen friction creeps under small cycles; give effects.bouc_wen = 'plastic'",
-    "footprint": "the normal force of surface {surface} acts {value:.3g} m from the axis of its slider, outside the "
-    "face: a real slider would tip; give effects.uplift = true",
     "rattle": "surface {surface} landed {value:d} times: loose sliders rattle, and their path depends on every "
     "disturbance; compare a smaller solver.rtol, or give the seat_damping of the device",
 }
@@ -163,8 +159,7 @@ def history_notes(scene: Scene, effects: Effects, history: History, steps: int) 
     unseen = (Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity]),) if scene.fidelity in UNSEEN else ()
     stack = scene.fidelity != "equivalent"
     doubts = unseen + tuple(Note(0.0, "value", *doubt) for doubt in scene_doubts(scene) if stack)
-    physics = footprint_notes(scene, effects, history) if stack else ()
-    physics += creep_notes(scene, effects, history)
+    physics = creep_notes(scene, effects, history)
     physics += peak_notes(scene, effects, history)
     numerics = energy_notes(scene, history) + tolerance_notes(scene, effects, history)
     numerics += vibration_notes(scene, effects, history, steps)
@@ -254,23 +249,6 @@ def landing_notes(events: tuple[Event, ...]) -> tuple[Note, ...]:
         times = np.array([event.time for event in events if event.kind == "landing" and event.surface == surface])
         if (times[LANDINGS:] - times[:-LANDINGS] < LANDING_TIME).any():
             notes.append(_note("rattle", times[0], len(times), surface))
-    return tuple(notes)
-
-
-def footprint_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
-    """A note for each surface whose contact point (3.14) leaves the face of its slider, which then would tip.
-
-    With uplift the slider stands on its edge instead (docs/uplift.md). Without a `rim_radius` no face is known.
-    """
-    if effects.uplift:
-        return ()
-    bearing, notes = scene.bearing, []
-    loaded = history.normal_force > FOOTPRINT_LOAD * np.median(history.normal_force, axis=0)
-    offsets = np.where(loaded, contact_offsets(bearing, history), 0.0)
-    faces = bearing.arrays()["rim_radius"][[bearing.slider(j) for j in range(history.surfaces)]]
-    for j in np.flatnonzero((offsets.max(axis=0) > faces) & (faces > 0)):
-        row = int(offsets[:, j].argmax())
-        notes.append(_note("footprint", history.time[row], offsets[row, j], int(j) + 1))
     return tuple(notes)
 
 

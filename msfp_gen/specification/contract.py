@@ -221,6 +221,7 @@ MONITORS = (
     Word("law_speed", "slip velocity outside the range in which the friction law was checked [m/s]"),
     Word("law_load", "normal force outside that range [N]"),
     Word("law_temperature", "temperature outside that range [degC]"),
+    Word("footprint", "the normal force acts beside the axis of a slider by more than the radius of its face [m]"),
 )
 
 

@@ -1,5 +1,5 @@
-/* monitors.c: checks of what a model leaves out (docs/effects.md): rims, uplift, inertia of the sliders, heat, and the
- * range of the friction law; and whether the model is valid at a state at all.
+/* monitors.c: checks of what a model leaves out (docs/effects.md): rims, uplift, the face of a slider, inertia of the
+ * sliders, heat, and the range of the friction law; and whether the model is valid at a state at all.
  *
  * A monitor checks every step before it is accepted. It records the first time at which its limit is exceeded, and the
  * value furthest beyond it. Where the run is to stop, that step is not accepted, and the present state is the last one
@@ -89,6 +89,32 @@ static finding unloaded(const msfp_run *run)
     }
     for (int j = 0; j < NB && !worst.surface; ++j)
         consider(&worst, run->work.contact[j][MSFP_CONTACT_N], most, j + 1);
+    return worst;
+}
+
+/* Distance of a contact point (3.14) from the axis of its slider, beyond the radius of the face [m]: there the slider
+ * tips. Surfaces below the least normal force do not count; without a radius no face is known. */
+static finding outside_face(const msfp_run *run)
+{
+    finding worst = { 0.0, 0.0, 0 };
+    for (int j = 0; j < NB; ++j) {
+        const double *par = run->parameters.surface[j], *contact = run->work.contact[j], *q = run->next.q[j];
+        const double sp = msfp_contact_sp(contact), cp = msfp_contact_cp(contact), st = contact[MSFP_CONTACT_ST],
+                     ct = contact[MSFP_CONTACT_CT];
+        const double normal[3] = { st, -ct * sp, ct * cp }; /* t~_3 (3.13), in the basis of the body below */
+        double axis[3] = { 0.0, 0.0, 1.0 }, across[3];
+        if (par[MSFP_SURFACE_PARAMETERS_SIGN] > 0.0) { /* the slider is the body above */
+            axis[0] = msfp_sin(q[1]);
+            axis[1] = -msfp_cos(q[1]) * msfp_sin(q[0]);
+            axis[2] = msfp_cos(q[1]) * msfp_cos(q[0]);
+        }
+        for (int i = 0; i < 3; ++i)
+            across[i] = normal[(i + 1) % 3] * axis[(i + 2) % 3] - normal[(i + 2) % 3] * axis[(i + 1) % 3];
+        const double aside =
+            par[MSFP_SURFACE_PARAMETERS_R] * msfp_hypot(across[0], msfp_hypot(across[1], across[2]));
+        if (contact[MSFP_CONTACT_N] > run->options.monitor_normal)
+            consider(&worst, aside, par[MSFP_SURFACE_PARAMETERS_RS], j + 1);
+    }
     return worst;
 }
 
@@ -203,6 +229,8 @@ int msfp_monitor_step(msfp_run *run, const double *gaps)
         found[MSFP_MONITOR_RIMS] = beyond_capacity(gaps);
     if (o->monitors & 1 << MSFP_MONITOR_UPLIFT)
         found[MSFP_MONITOR_UPLIFT] = unloaded(run);
+    if (o->monitors & 1 << MSFP_MONITOR_FOOTPRINT)
+        found[MSFP_MONITOR_FOOTPRINT] = outside_face(run);
     if (o->monitors & 1 << MSFP_MONITOR_INERTIA)
         found[MSFP_MONITOR_INERTIA] = inertial(run, h);
     if (o->monitors & 1 << MSFP_MONITOR_HEAT)
