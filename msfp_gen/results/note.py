@@ -47,8 +47,8 @@ _MAX_VELOCITY = RANGES["v"][-1]
 TEXTS = {
     "rims": "a slider is {most}{value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
     "uplift": "the normal force of surface {surface} is {value:.4g} N; contacts of the model are rigid and cannot open",
-    "footprint": "the normal force of surface {surface} acts {most}{value:.3g} m from the axis of its slider, outside the "
-    "face, and the slider of the model cannot tip",
+    "footprint": "the normal force of surface {surface} acts {most}{value:.3g} m from the axis of its slider, outside "
+    "the face, and the slider of the model cannot tip",
     "inertia": "the inertial force of body {body} is {most}{value:.2g} of N on surface {surface}; the model has none",
     "heat": "friction may heat surface {surface} by {most}{value:.3g} K; its friction law does not depend on "
     "temperature",

@@ -26,7 +26,7 @@ extern "C" {
 #endif
 
 /* Rises with every change of this file that a compiled program notices. */
-#define MSFP_ABI_VERSION 2
+#define MSFP_ABI_VERSION 3
 
 /* How a run or an evaluation ended. */
 enum msfp_status {
@@ -102,6 +102,7 @@ enum msfp_monitor {
     MSFP_MONITOR_LAW_SPEED, /* slip velocity outside the range in which the friction law was checked [m/s] */
     MSFP_MONITOR_LAW_LOAD, /* normal force outside that range [N] */
     MSFP_MONITOR_LAW_TEMPERATURE, /* temperature outside that range [degC] */
+    MSFP_MONITOR_FOOTPRINT, /* the normal force acts beside the axis of a slider by more than the radius of its face [m] */
     MSFP_MONITORS
 };
 

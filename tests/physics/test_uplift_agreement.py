@@ -56,6 +56,24 @@ def test_a_contact_outside_the_face_is_noted():
     assert "uplift" in note.text
 
 
+def test_auto_lets_a_slider_tip_where_the_force_leaves_its_face():
+    """Uplift is taken in there, with the force of a run that has it from the start; where it is fixed, a note stays."""
+    scene = load_scene("triple-push")
+    scene = replace(scene, bearing=scene.bearing.replace(rim_radius=[0.010, 0.0255, 0.0255, 0.010]))
+    planar = Effects(dimension="planar", uplift=True)
+    chosen, whole, rigid = (
+        simulate(replace(scene, effects=effects, output_step=0.05))
+        for effects in (Auto(dimension="planar"), planar, Auto(dimension="planar", uplift=False))
+    )
+    notes = [next(note for note in run.notes if note.kind == "footprint") for run in (chosen, rigid)]
+    assert "uplift = True" in notes[0].action and not notes[1].action and "effects.uplift" in notes[1].text
+    assert notes[0].time == pytest.approx(notes[1].time, abs=0.05)
+    rows = slice(int(notes[0].time / 0.05) + 2, len(chosen.history.time) - 1)
+    friction = whole.history.normal_force[0].max() * max(surface.friction for surface in scene.bearing.surfaces)
+    force = [run.history.top_force[rows, 0] for run in (chosen, whole)]
+    assert np.sqrt(np.mean((force[0] - force[1]) ** 2)) < 0.005 * friction
+
+
 def test_auto_opens_the_contacts_before_a_rigid_mass_jams_them():
     """Taken in at the first peak, uplift gives the forces of a run that has it from the start."""
     chosen = simulate(swayed(Auto(dimension="planar", sliders="inertial")))
