@@ -89,11 +89,9 @@ def run(
         str | None,
         typer.Option(metavar="COLUMN", help="Estimate a statistic of this quantity with few exact runs ([accuracy])."),
     ] = None,
-    statistic: Annotated[
-        str | None, typer.Option(metavar="mean|variance|probability|quantile|fragility", help="Of the estimate.")
-    ] = None,
+    statistic: Annotated[str | None, typer.Option(metavar="mean|probability", help="Of the estimate.")] = None,
     threshold: Annotated[
-        str | None, typer.Option(metavar="VALUE", help="Of a probability or fragility; the share of a quantile.")
+        str | None, typer.Option(metavar="VALUE", help="Of a probability: the value that is reached.")
     ] = None,
     target: Annotated[
         str | None, typer.Option(metavar="SHARE", help="Half width of the interval over the value, such as 2%.")

@@ -128,7 +128,7 @@ def run_on(
     if progress is not None:
         progress(before, total)
     done = 0
-    timed = "listed" in study.table.get("accuracy", {})
+    timed = "draws" in study.table.get("accuracy", {})
     common = study.recipe, study.files, study.keep, study.limits.run_seconds
     order = Order(chunks.identity, chunks.digest, *common, timed)
     calls = ((task, (order, task)) for task in map(study.task, missing))

@@ -33,14 +33,14 @@ STATISTICS: dict[str, Callable[..., Any]] = {
 def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
     """The rows that a study has so far, as a pandas.DataFrame, sorted by run.
 
-    columns: to be read beside `run` and `status`; None: all. `DataFrame.attrs["units"]` has the units, `attrs["sides"]`
-    how runs that ended early bound a column, and `attrs["chosen"]` states whether an estimate chose the runs. Raises
+    columns: to be read beside `run` and `status`; None: all. `DataFrame.attrs["units"]` has the units, and
+    `attrs["sides"]` how runs that ended early bound a column. Raises
     InputError: the folder has no study, the study has no rows yet, or a column is unknown.
     """
     import pyarrow.dataset as ds
 
     folder = Path(folder)
-    table = study_table(folder)
+    study_table(folder)
     parts = [str(folder / name) for name in sorted(parts_in(folder))]
     if not parts:
         raise InputError(f"{str(folder)!r}: the study has no rows yet; run it")
@@ -51,7 +51,6 @@ def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
     names = None if columns is None else list(dict.fromkeys(["run", "status", *columns]))
     with readable_parts(folder):
         rows = dataset.to_table(columns=names).to_pandas().sort_values("run", ignore_index=True)
-    rows.attrs["chosen"] = "listed" in table.get("accuracy", {})
     rows.attrs["sides"] = json.loads((dataset.schema.metadata or {}).get(b"sides", b"{}"))
     rows.attrs["units"] = {field.name: (field.metadata or {}).get(b"units", b"").decode() for field in dataset.schema}
     return rows
@@ -121,13 +120,8 @@ def demands(rows: Any, name: str) -> Array:
 
     For a run that ended early it is a bound, on the side of `side_of`; without a value 0, or infinite from above.
 
-    Raises InputError where a run that reached its end has no value, and for runs that an estimate chose.
+    Raises InputError where a run that reached its end has no value.
     """
-    if rows.attrs.get("chosen"):
-        raise InputError(
-            f"{name}: the runs of an estimate were chosen where they decide most, which a curve through them does not "
-            "know; give --estimate with --statistic fragility and a threshold, or run the study without an estimate"
-        )
     values = numbers(rows, name)
     if count := int(np.isnan(values[complete(rows)]).sum()):
         raise InputError(f"{name}: {count} runs reached their end without a value; give another quantity")

@@ -1,20 +1,15 @@
-"""The runs of an estimate: numbers of draws come in, values of a model at these draws go out.
+"""The runs of an estimate: a number of draws comes in, values of a model at the first draws go out.
 
 A draw is a combination of the values of the gridded axes, all equally likely, and one value of each random axis. Draw k
 is the same for every model and in every call. The runs of each model are a study of its own in a folder.
-
-For a fragility, `Searches` takes the place of a run: it finds the intensity at which the quantity of a draw reaches a
-threshold. The runs of a search are at scales of the study. They close in on the two neighbouring scales between which
-the quantity reaches the threshold, and a power law between the two gives the crossing (in the manner of the IDA curves
-of Vamvatsikos and Cornell, 2002).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -27,9 +22,11 @@ from msfp_gen.studies.batch import Pool
 from msfp_gen.studies.columns import Keep
 from msfp_gen.studies.definition import Study
 from msfp_gen.studies.estimation.backbone_run import OF_SURFACES, QUANTITIES, check_backbone
-from msfp_gen.studies.estimation.estimators import EXACT, Flags, Indices
+from msfp_gen.studies.estimation.estimators import EXACT
 from msfp_gen.studies.run import STUDY_FILE, parts_in, readable_parts, run_on, study_table
 
+Indices = np.ndarray[Any, np.dtype[np.intp]]
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
 BLOCK = 1024  # draws that are made together
 CHUNKS = {EXACT: 4, "backbone": 64}  # model -> runs of a part
 CHUNK = 8  # runs of a part of any other model
@@ -45,11 +42,11 @@ class Source(Protocol):
     levels: tuple[str, ...]
     population: int | None
 
-    def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
-        """The quantity at draws, shape (draws,) [its unit], and which runs ended early, shape (draws,).
+    def values(self, level: str, count: int) -> tuple[Array, Flags]:
+        """The quantity at the first draws, shape (count,) [its unit], and which runs ended early, shape (count,).
 
         Missing runs are computed. The quantity of a run that ended early is the value until then; it is infinite where
-        a run has no value. scales: index of the scale of each run, shape (draws,), in place of the scale of its draw.
+        a run has no value.
         """
 
     def cost(self, level: str) -> float:
@@ -94,16 +91,6 @@ class Draws:
             self._blocks[block] = cells, values_at(shares, self.study.distributions)
         return self._blocks[block]
 
-    def intensity(self, numbers: Indices) -> Array:
-        """The intensity of draws at scale 1, shape (draws,) [m/s^2]; 1 where the study has no intensity."""
-        of_record = self.study.recipe.intensities
-        if not of_record:
-            return np.ones(len(numbers))
-        gridded = [axis for axis in self.study.axes if axis.values is not None]
-        position = [axis.name for axis in gridded].index("record")
-        records = np.unravel_index(self.of(numbers)[0], self.study.grid)[position]
-        return np.array([of_record[(gridded[position].values or ())[record]] for record in records])
-
 
 class StudySource:
     """The source of a study: exact runs are in the folder of the study, runs of each other model in a folder within.
@@ -126,11 +113,11 @@ class StudySource:
         }
         self._progress = progress
 
-    def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
+    def values(self, level: str, count: int) -> tuple[Array, Flags]:
         """As of `Source`."""
         if self._progress is not None:
-            self._progress(level, len(draws))
-        return self._models[level].values(draws, scales)
+            self._progress(level, count)
+        return self._models[level].values(count)
 
     def cost(self, level: str) -> float:
         """As of `Source`."""
@@ -138,52 +125,39 @@ class StudySource:
 
     def spent(self) -> tuple[float, dict[str, int]]:
         """As of `Source`."""
-        runs = {level: len(model.listed) for level, model in self._models.items() if model.listed}
+        runs = {level: model.count for level, model in self._models.items() if model.count}
         return sum(count * self.cost(level) for level, count in runs.items()), runs
 
 
 class _Model:
-    """The runs of one model, kept as a study in a folder.
-
-    listed: (draw, index of the scale in place of the scale of the draw, or -1) of every row, in the order of requests.
-    """
+    """The runs of one model at the first `count` draws, kept as a study in a folder."""
 
     def __init__(self, study: Study, folder: Path, quantity: str, draws: Draws, pool: Pool) -> None:
         self.study, self.folder, self.quantity, self.draws, self.pool = study, folder, quantity, draws, pool
-        self.listed: list[tuple[int, int]] = []
+        self.count = 0
         if (folder / STUDY_FILE).is_file():
-            listed = study_table(folder).get("accuracy", {}).get("listed", [])
-            self.listed = [(int(draw), int(scale)) for draw, scale in listed]
+            self.count = int(study_table(folder).get("accuracy", {}).get("draws", 0))
         self._values, self._early = np.zeros(0), np.zeros(0, dtype=bool)
 
-    def values(self, draws: Indices, scales: Indices | None) -> tuple[Array, Flags]:
-        pairs = list(zip(draws.tolist(), [-1] * len(draws) if scales is None else scales.tolist(), strict=True))
-        present = set(self.listed)
-        if (missing := [pair for pair in dict.fromkeys(pairs) if pair not in present]) or not len(self._values):
-            self.listed += missing
+    def values(self, count: int) -> tuple[Array, Flags]:
+        if count > len(self._values):
+            self.count = max(count, self.count)
             self._run()
-        row_of = {pair: row for row, pair in enumerate(self.listed)}
-        rows = [row_of[pair] for pair in pairs]
-        return self._values[rows], self._early[rows]
+        return self._values[:count], self._early[:count]
 
     def _run(self) -> None:
         run_on(self.pool, self._listed_study(), self.folder)
         rows = read_study(self.folder, [self.quantity])
         values = numbers(rows, self.quantity)
         complete = np.asarray(rows["status"] == COMPLETE)
-        if len(values) < len(self.listed):
-            raise RunError(
-                f"{self.folder}: {len(self.listed) - len(values)} runs are missing; run the same command again"
-            )
+        if len(values) < self.count:
+            raise RunError(f"{self.folder}: {self.count - len(values)} runs are missing; run the same command again")
         self._values = np.where(np.isnan(values), np.inf, values)
         self._early = ~complete | np.isnan(values)
 
     def _listed_study(self) -> Study:
-        """The study whose rows are the listed runs."""
-        draws, scales = (np.array(column, dtype=np.intp) for column in zip(*self.listed, strict=True))
-        cells, values = self.draws.of(draws)
-        if (scales >= 0).any():
-            cells = _with_scales(self.study, cells, scales)
+        """The study whose rows are the runs."""
+        cells, values = self.draws.of(np.arange(self.count))
         sampling = Sampling(
             "listed",
             values=tuple(map(tuple, values.tolist())) if values.shape[1] else None,
@@ -191,7 +165,7 @@ class _Model:
         )
         listing = {"method": "listed", "cells": list(sampling.cells or ())}
         listing |= {"values": values.tolist()} if values.shape[1] else {}
-        accuracy = {**self.study.table.get("accuracy", {}), "listed": [list(pair) for pair in self.listed]}
+        accuracy = {**self.study.table.get("accuracy", {}), "draws": self.count}
         return replace(
             self.study, sampling=sampling, table={**self.study.table, "sampling": listing, "accuracy": accuracy}
         )
@@ -209,15 +183,6 @@ class _Model:
                 schema = pq.read_metadata(self.folder / name)
             seconds.append(float((schema.metadata or {})[b"seconds"]) / schema.num_rows)
         return float(np.median(seconds))
-
-
-def _with_scales(study: Study, cells: Indices, scales: Indices) -> Indices:
-    """The combinations with these values of the axis `scale`, by index; where the index is -1, as they are."""
-    names = [axis.name for axis in study.axes if axis.values is not None]
-    positions = list(np.unravel_index(cells, study.grid))
-    axis = names.index("scale")
-    positions[axis] = np.where(scales >= 0, scales, positions[axis])
-    return np.asarray(np.ravel_multi_index(positions, study.grid))
 
 
 def level_study(study: Study, level: str, quantity: str) -> Study:
@@ -261,117 +226,3 @@ def _names_in(keep: Keep, quantity: str) -> list[str]:
     if "(" in text and any(f"{word}(" in text for word in ("peak", "least", "most", "last")):
         return [text]
     return sorted(formula.names_in(formula.parse(text, [*keep.known, *keep.axes])))
-
-
-@dataclass(frozen=True)
-class Crossings:
-    """The scales at which the quantity of draws reaches a threshold.
-
-    logarithms: of the scales, shape (draws,) [-]. beyond: number of crossings outside the scales of the study. runs:
-    number of runs of all searches.
-    """
-
-    logarithms: Array
-    beyond: int
-    runs: int
-
-
-def crossings(source: Source, level: str, draws: Indices, scales: Array, threshold: float, guess: Array) -> Crossings:
-    """Search the scales at which the quantity of draws reaches a threshold.
-
-    scales: rising, shape (k,) [-]. guess: logarithm of the scale at which each search begins, shape (draws,) [-].
-    """
-    count = len(scales)
-    # Indices of scales next to each crossing: the quantity is below the threshold at `low`, at or above it at `high`.
-    low, high = np.full(len(draws), -1), np.full(len(draws), count)
-    values = np.full((len(draws), count), np.nan)
-    upcoming = np.searchsorted(np.log(scales), guess).clip(0, count - 1)
-    runs = 0
-    while (unfinished := np.flatnonzero(high - low > 1)).size:
-        at = upcoming[unfinished]
-        reached, early = source.values(level, draws[unfinished], at)
-        values[unfinished, at] = np.where(early & (reached < threshold), np.inf, reached)
-        runs += len(unfinished)
-        exceeds = values[unfinished, at] >= threshold
-        high[unfinished] = np.where(exceeds, np.minimum(at, high[unfinished]), high[unfinished])
-        low[unfinished] = np.where(exceeds, low[unfinished], np.maximum(at, low[unfinished]))
-        upcoming = _next_scale(low, high, upcoming, count)
-    logarithms = np.array(
-        [_crossing(np.log(scales), row, lo, hi, threshold) for row, lo, hi in zip(values, low, high, strict=True)]
-    )
-    return Crossings(logarithms, int(((low < 0) | (high >= count)).sum()), runs)
-
-
-def _next_scale(low: Indices, high: Indices, last: Indices, count: int) -> Indices:
-    """Index of the scale to run next: beside the last scale until the crossing is enclosed, then in the middle."""
-    beside = np.where(last == low, low + 1, high - 1)
-    middle = (low + high) // 2
-    enclosed = (low >= 0) & (high < count)
-    return np.where(enclosed, middle, beside).clip(0, count - 1)
-
-
-def _crossing(logs: Array, values: Array, low: int, high: int, threshold: float) -> float:
-    """Logarithm of the scale of a crossing, by a power law between two neighbours.
-
-    logs: logarithms of the scales. values: of the quantity at the scales. low, high: indices of the neighbours. Beyond
-    the scales the crossing is half a step from the last scale; where no power law exists, in the middle.
-    """
-    if low < 0:
-        return float(logs[0] - (logs[1] - logs[0]) / 2)
-    if high >= len(logs):
-        return float(logs[-1] + (logs[-1] - logs[-2]) / 2)
-    below, above = values[low], values[high]
-    if not np.isfinite(above) or not 0 < below < above:
-        return float((logs[low] + logs[high]) / 2)
-    share = np.log(threshold / below) / np.log(above / below)
-    return float(logs[low] + share * (logs[high] - logs[low]))
-
-
-class Searches:
-    """A source whose value at a draw is the logarithm of the intensity at which its quantity reaches a threshold.
-
-    source: of the runs of a search. scales: of the study, rising, shape (k,) [-]. intensity: draws -> logarithm of the
-    intensity at scale 1. beyond: number of exact crossings outside the scales.
-    """
-
-    def __init__(self, source: Source, threshold: float, scales: Array, intensity: Callable[[Indices], Array]) -> None:
-        self.source, self.threshold, self.scales, self.intensity = source, threshold, scales, intensity
-        self.levels, self.population = source.levels, source.population
-        self.beyond = 0
-        self._values: dict[str, dict[int, float]] = {level: {} for level in source.levels}
-        self._runs = dict.fromkeys(source.levels, 0)
-
-    def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
-        """Logarithms of the intensities of the crossings, shape (draws,) [-]; no search ends early."""
-        crossed = self._values[level]
-        new = np.array([draw for draw in draws.tolist() if draw not in crossed], dtype=np.intp)
-        if new.size:
-            found = crossings(self.source, level, new, self.scales, self.threshold, self._guess(level, new))
-            self._runs[level] += found.runs
-            self.beyond += found.beyond if level == EXACT else 0
-            crossed.update(zip(new.tolist(), found.logarithms.tolist(), strict=True))
-        logarithms = np.array([crossed[draw] for draw in draws.tolist()])
-        return logarithms + self.intensity(draws), np.zeros(len(draws), dtype=bool)
-
-    def _guess(self, level: str, draws: Indices) -> Array:
-        """Logarithm of the scale at which each search begins, shape (draws,) [-].
-
-        For the exact model it is the crossing of the first cheaper model that has any, shifted by the median
-        difference of the two models so far; for any other model the middle of the scales.
-        """
-        middle = float(np.log(self.scales[len(self.scales) // 2]))
-        cheaper = next((name for name in self.levels[1:] if self._values[name] and name != level), None)
-        if level != EXACT or cheaper is None:
-            return np.full(len(draws), middle)
-        crossed = self._values[cheaper]
-        shifts = [value - crossed[draw] for draw, value in self._values[level].items() if draw in crossed]
-        shift = float(np.median(shifts)) if shifts else 0.0
-        return np.array([crossed.get(draw, middle) + shift for draw in draws.tolist()])
-
-    def cost(self, level: str) -> float:
-        """Core time of the search of a draw [s]."""
-        return self.source.cost(level) * self._runs[level] / max(len(self._values[level]), 1)
-
-    def spent(self) -> tuple[float, dict[str, int]]:
-        """As of `Source`."""
-        return self.source.spent()

@@ -11,22 +11,12 @@ from scipy.stats import norm
 from msfp_gen import Effects, InputError, Motion, load_scene
 from msfp_gen.scene.fidelity import Backbone, at_fidelity
 from msfp_gen.scene.file.loader import bearing_from_table
-from msfp_gen.studies import estimate, fragility, ida, read_study
+from msfp_gen.studies import estimate, read_study
 from msfp_gen.studies.batch import run_to_end
 from msfp_gen.studies.definition import example_text
 from msfp_gen.studies.estimation.backbone_run import parallel
-from msfp_gen.studies.estimation.estimate import Question, estimate_table, estimated, fragility_of, plot_estimate
-from msfp_gen.studies.estimation.estimators import (
-    Runs,
-    best_chain,
-    exceeding,
-    optimal_runs,
-    quantile_of,
-    shares_of_variance,
-    telescoped,
-    work_of,
-)
-from msfp_gen.studies.estimation.source import crossings
+from msfp_gen.studies.estimation.estimate import Question, estimate_table, estimated, plot_estimate
+from msfp_gen.studies.estimation.estimators import exceeding, mean_of, optimal_runs, work
 
 SPREAD, NOISE = 0.5, 0.1  # standard deviation of the logarithm, and share of it that the cheap model does not see
 
@@ -47,18 +37,18 @@ class Lognormal:
         }
         self._early = rng.random(count) < fails
         self._costs = {"exact": 1.0, "backbone": cost, "massless": 0.3}
-        self._done = {level: set() for level in levels}
+        self._done = dict.fromkeys(levels, 0)
 
-    def values(self, level, draws, scales=None):
-        self._done[level] |= set(draws.tolist())
-        early = self._early[draws] if level == "exact" else np.zeros(len(draws), dtype=bool)
-        return self._values[level][draws], early
+    def values(self, level, count):
+        self._done[level] = max(count, self._done[level])
+        early = self._early[:count] if level == "exact" else np.zeros(count, dtype=bool)
+        return self._values[level][:count], early
 
     def cost(self, level):
         return self._costs[level]
 
     def spent(self):
-        runs = {level: len(done) for level, done in self._done.items() if done}
+        runs = {level: done for level, done in self._done.items() if done}
         return sum(self._costs[level] * count for level, count in runs.items()), runs
 
 
@@ -67,69 +57,53 @@ def truth(noise=NOISE):
 
 
 def test_the_allocation_is_the_optimum_of_a_search():
-    shares = shares_of_variance(np.array([1.0, 0.999, 0.97]))
-    costs = np.array([1.0, 0.3, 0.002])
-    runs = optimal_runs(shares, costs, variance=1e-3)
-    assert shares @ (1 / runs) == pytest.approx(1e-3)
+    variances, costs = np.array([0.06, 0.94]), np.array([1.0, 0.002])
+    runs = optimal_runs(variances, costs, variance=1e-3)
+    assert variances @ (1 / runs) == pytest.approx(1e-3)
     found = minimize(
         lambda logs: np.exp(logs) @ costs, np.log(runs) + 0.3, constraints=[
-            {"type": "eq", "fun": lambda logs: 1e3 * (shares @ np.exp(-logs)) - 1}
+            {"type": "eq", "fun": lambda logs: 1e3 * (variances @ np.exp(-logs)) - 1}
         ],
     )  # fmt: skip
     assert runs @ costs == pytest.approx(found.fun, rel=1e-6)
-    assert work_of(shares, costs) == pytest.approx(runs @ costs * 1e-3, rel=1e-9)
-    assert optimal_runs(shares, costs, seconds=60.0) @ costs == pytest.approx(60.0)
+    assert work(np.sqrt(0.94), 0.002) == pytest.approx(runs @ costs * 1e-3, rel=1e-9)
+    assert optimal_runs(variances, costs, seconds=60.0) @ costs == pytest.approx(60.0)
 
 
 def test_the_published_ratio_of_two_models():
     """Peherstorfer et al. (2016), (3.5): r = sqrt(w_1 rho^2 / (w_2 (1 - rho^2)))."""
-    runs = optimal_runs(shares_of_variance(np.array([1.0, 0.9])), np.array([1.0, 0.01]), variance=1.0)
+    runs = optimal_runs(np.array([0.19, 0.81]), np.array([1.0, 0.01]), variance=1.0)
     assert runs[1] / runs[0] == pytest.approx(np.sqrt(0.81 / (0.01 * 0.19)))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("correlations", [(1.0, 0.97, 0.9), (1.0, 0.995, 0.8), (1.0, 0.9)])
-def test_allocation_and_variance_are_those_of_mxmcpy(correlations):
-    """NASA's program, which needs PyTorch: pip install mxmcpy torch."""
-    optimizer = pytest.importorskip("mxmc").Optimizer
-    rho, spread = np.array(correlations), np.array([2.0, 1.5, 0.7])[: len(correlations)]
-    costs = np.array([100.0, 5.0, 1.0])[[0, *range(-len(rho) + 1, 0)]]
-    matrix = np.minimum.outer(rho, rho) / np.maximum.outer(rho, rho)  # the cheaper through the better ones
-    matrix[0], matrix[:, 0] = rho, rho
-    theirs = optimizer(costs, np.outer(spread, spread) * matrix).optimize("mfmc", target_cost=1e6)
-    variances = shares_of_variance(rho) * spread[0] ** 2
-    runs = optimal_runs(variances, costs, seconds=1e6)
-    assert theirs.allocation.get_number_of_samples_per_model() == pytest.approx(runs, abs=1.0)
-    assert theirs.variance == pytest.approx(variances @ (1 / runs), rel=1e-3)
+def test_the_estimate_is_the_regression_line_at_the_mean_of_the_cheap_model():
+    rng = np.random.default_rng(4)
+    cheap = rng.standard_normal(500)
+    exact = 2.0 + 0.7 * cheap[:40] + 0.1 * rng.standard_normal(40)
+    slope, intercept = np.polyfit(cheap[:40], exact, 1)
+    found = mean_of(exact, cheap)
+    assert found.value == pytest.approx(intercept + slope * cheap.mean())
+    beyond = slope * np.abs(cheap - np.clip(cheap, cheap[:40].min(), cheap[:40].max())).mean()
+    assert found.residual == pytest.approx(np.sum((exact - intercept - slope * cheap[:40]) ** 2) / 38 + 40 * beyond**2)
+    assert found.explained == pytest.approx(slope**2 * cheap.var(ddof=1)) and found.freedom == 38
+    assert mean_of(exact).value == exact.mean() and mean_of(exact).variance == pytest.approx(exact.var(ddof=1) / 40)
 
 
-def test_the_chain_leaves_out_what_does_not_pay():
-    costs = {"exact": 1.0, "massless": 0.5, "backbone": 0.01}
-    assert best_chain({"exact": 1.0, "massless": 0.99999, "backbone": 0.9}, costs).models == (
-        "exact", "massless", "backbone",
-    )  # fmt: skip
-    assert best_chain({"exact": 1.0, "massless": 0.99, "backbone": 0.9999}, costs).models == ("exact", "backbone")
-    assert best_chain({"exact": 1.0, "backbone": 0.05}, costs | {"backbone": 0.5}).models == ("exact",)
-
-
-@pytest.mark.slow
 def test_the_variance_is_that_of_repetitions():
-    """Brute force: the stated variance of an estimate of three levels against that of two hundred repetitions."""
-    values, variances = [], []
-    for seed in range(200):
-        source = Lognormal(seed, levels=("exact", "massless", "backbone"))
-        rng = np.random.default_rng([seed, 9])
-        uniform, draws = rng.random(2000), np.arange(2000)
-        levels = []
-        for level, chance in (("exact", 0.05), ("massless", 0.2), ("backbone", 1.0)):
-            chances = np.where(draws < 40, 1.0, chance)
-            here = draws[uniform < chances]
-            levels.append(Runs(here, source.values(level, here)[0], chances[here]))
-        moment = telescoped(levels[0].values, levels, 40)
-        values.append(moment.value)
-        variances.append(moment.variance)
-    assert np.mean(values) == pytest.approx(np.exp(truth() / 2), abs=4 * np.std(values) / np.sqrt(200))
-    assert np.mean(variances) == pytest.approx(np.var(values), rel=0.3)
+    """The stated variance against that of two thousand estimates from 60 exact and 600 cheap draws."""
+    rng, found = np.random.default_rng(3), []
+    for _ in range(2000):
+        hidden, other = rng.standard_normal((2, 600))
+        found.append(mean_of(np.exp(SPREAD * (hidden + NOISE * other))[:60], 1.1 * np.exp(0.45 * hidden)))
+    values = np.array([one.value for one in found])
+    stated = np.mean([one.variance for one in found])  # what lies beyond the exact runs counts as an error
+    assert 0.9 * values.var() < stated < 1.6 * values.var()
+    assert values.mean() == pytest.approx(np.exp(truth() / 2), abs=0.003)
+
+
+def test_an_event_that_no_run_shows_may_still_occur():
+    """The rule of three: of 100 runs without an event the interval reaches to about 3/100."""
+    assert exceeding(np.zeros(100), None, 1.0).half == pytest.approx(0.028, abs=0.001)
 
 
 CASES = {
@@ -141,14 +115,14 @@ RARE = float(np.exp(norm.isf(1e-3) * np.sqrt(truth())))  # what one draw in a th
 
 @pytest.mark.parametrize("case", ["mean", pytest.param("probability", marks=pytest.mark.slow)])
 def test_intervals_hold_the_truth(case):
-    """Of a hundred intervals of 95 % at least 88 hold it (a chance of 0.4 % for fewer); few exact runs suffice."""
+    """Of a hundred intervals of 95 % at least 88 hold it (a chance of 0.4 % for fewer); exact runs are saved."""
     statistic, threshold, target, value = CASES[case]
     held, gains = 0, []
     for seed in range(100):
         found = estimated(Lognormal(seed), Question("q", statistic, threshold, target=target, seed=seed))
         held += found.interval[0] <= value() <= found.interval[1]
         gains.append(found.plain_seconds / found.seconds)
-    assert held >= 88 and np.median(gains) > 5
+    assert held >= 88 and np.median(gains) > 3
 
 
 @pytest.mark.slow
@@ -156,17 +130,12 @@ def test_intervals_hold_the_truth(case):
     ("statistic", "threshold", "target", "value"), [
         ("mean", None, 0.03, np.exp(truth() / 2)),
         ("probability", 2.0, 0.02, norm.sf(np.log(2.0) / np.sqrt(truth()))),
-        ("probability", RARE, 3e-4, 1e-3),
-        ("quantile", 0.8, 0.03, np.exp(0.8416212 * np.sqrt(truth()))),
+        ("probability", RARE, 1e-3, 1e-3),
     ],
 )  # fmt: skip
 def test_coverage_over_many_repetitions(statistic, threshold, target, value):
-    held, gains = 0, []
-    for seed in range(400):
-        found = estimated(Lognormal(seed), Question("q", statistic, threshold, target=target, seed=seed))
-        held += found.interval[0] <= value <= found.interval[1]
-        gains.append(found.plain_seconds / found.seconds)
-    assert 0.92 <= held / 400 <= 0.98 and np.median(gains) > 3
+    every = (estimated(Lognormal(seed), Question("q", statistic, threshold, target=target)) for seed in range(400))
+    assert sum(found.interval[0] <= value <= found.interval[1] for found in every) >= 0.91 * 400
 
 
 class Overshooting(Lognormal):
@@ -181,8 +150,8 @@ class Overshooting(Lognormal):
         self._values = {"exact": np.where(rare, 5 * exact, exact), "backbone": np.where(rare, 500 * exact, close)}
 
 
-def test_a_wrong_prediction_of_few_draws_does_not_leave_out_the_others():
-    """Exact runs at the rare draws alone left intervals that were off by up to six half widths."""
+def test_a_cheap_model_that_is_wrong_at_few_draws_misleads_nobody():
+    """Those draws are beyond the exact runs of the pilot: an error, until some are among them."""
     for seed in range(12):
         source = Overshooting(seed)
         found = estimated(source, Question("q", target=0.02, seed=seed))
@@ -232,44 +201,6 @@ def test_a_budget_that_does_not_permit_the_target_is_one_line():
 def test_a_budget_is_kept():
     found = estimated(Lognormal(), Question("q", budget=120.0))
     assert 60 < found.seconds < 130
-
-
-def test_levels_of_a_quantile():
-    source, draws = Lognormal(), np.arange(4000)
-    levels = [Runs(draws[:200], source.values("exact", draws[:200])[0], np.ones(200))]
-    levels.append(Runs(draws, source.values("backbone", draws)[0], np.ones(4000)))
-    value, (low, high), _ = quantile_of(levels, 0.5, 200)
-    assert low < value < high and low <= 1.0 <= high
-    assert exceeding(levels, value, 200).value == pytest.approx(0.5, abs=0.01)
-
-
-class PowerLaw(Lognormal):
-    """Draws whose quantity grows with the square of the scale, and reaches 1 at scales of known distribution."""
-
-    scales = np.linspace(0.25, 4.0, 16)
-
-    def values(self, level, draws, scales=None):
-        values, early = super().values(level, draws)
-        self._done[level] |= {(draw, scale) for draw, scale in zip(draws.tolist(), scales.tolist(), strict=True)}
-        return (self.scales[scales] / 1.5) ** 2 / values**2, early
-
-
-def test_crossings_take_few_runs():
-    source, draws = PowerLaw(), np.arange(200)
-    known = np.log(1.5 * source._values["exact"][:200])
-    found = crossings(source, "exact", draws, source.scales, 1.0, known)
-    inside = (known > np.log(0.25)) & (known < np.log(4.0))
-    assert found.logarithms[inside] == pytest.approx(known[inside], abs=1e-9)
-    assert found.runs < 3.2 * 200 and found.beyond == (~inside).sum()
-
-
-def test_a_fragility_has_the_known_median_and_dispersion():
-    source = PowerLaw()
-    found = fragility_of(
-        source, Question("q", "fragility", 1.0, target=0.03), source.scales, lambda d: np.zeros(len(d))
-    )
-    assert found.interval[0] <= 1.5 <= found.interval[1]
-    assert found.dispersion == pytest.approx(np.sqrt(truth()), rel=0.2)
 
 
 @pytest.mark.parametrize(("name", "factor"), [("prototype-tfp", 1.0), ("fenz-tfp", 1.6), ("quintuple-fp", 2.1229)])
@@ -329,9 +260,6 @@ def test_an_estimate_of_a_study_is_kept_and_continued(tmp_path):
     rows = read_study(tmp_path / "out")
     assert len(rows) == first.runs["exact"] >= 16 and "peak_force" in rows.columns
     assert (tmp_path / "out" / "backbone" / "study.toml").is_file() and first.correlation["backbone"] > 0.8
-    for curve in (lambda: ida(rows, "scale", "peak_force"), lambda: fragility(rows, "scale", "peak_force", [1e4])):
-        with pytest.raises(InputError, match="runs of an estimate were chosen"):
-            curve()
     times = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("part-*")}
     again = estimate(table, tmp_path / "out", threads=True, workers=1)
     assert again.value == first.value and again.interval == first.interval
@@ -350,6 +278,7 @@ BAD = {
     "not of the cheap model": ({"quantity": "normal", "target": 0.1}, "none of the model 'backbone'"),
     "threshold": ({"quantity": "peak_force", "statistic": "probability", "target": 0.1}, "accuracy.threshold"),
     "text": ({"quantity": "peak_force", "target": "two"}, "accuracy.target = 'two'"),
+    "statistic": ({"quantity": "peak_force", "statistic": "quantile", "threshold": 0.5, "target": 0.1}, "statistic"),
     "models": ({"quantity": "peak_force", "target": 0.1, "models": ["cheap"]}, "accuracy.models has 'cheap'"),
     "no such model": ({"quantity": "peak_force", "target": 0.1, "models": ["rigid"]}, "one bearing has no such model"),
     "no cheaper model": ({"quantity": "peak_force", "target": 0.1}, "the model 'backbone' carries a mass"),
