@@ -1,6 +1,7 @@
 """The public C interface: its header, and what it states about a model: names, lists of numbers, texts and checks.
 
-The header is the only description of its types and functions: its text is read to declare them in Cython and Fortran.
+The header is the only description of its types and functions: its text is read to declare them in Cython and, by
+`embedding/fortran.py`, in Fortran.
 """
 
 from __future__ import annotations
@@ -241,11 +242,8 @@ def public_header() -> str:
 _STRUCT = re.compile(r"typedef struct(?: \w+)? \{(.*?)\} (\w+);", re.DOTALL)
 _OPAQUE = re.compile(r"typedef struct (\w+) \1;")
 _CALLBACK = re.compile(r"typedef (\w+) \(\*(\w+)\)\((.*?)\);")
-_CONSTANT = re.compile(r"#define (\w+) (\d+)")
 _FUNCTION = re.compile(r"(.+?)\(\*(\w+)\)\((.*)\)")
 _ENTRY = re.compile(r"(\**)(\w+)((?:\[\w+\])*)")
-_FORTRAN = {"int": "integer(c_int)", "double": "real(c_double)", "size_t": "integer(c_size_t)"}
-_ZEROS = {"integer(c_int)": "0", "real(c_double)": "0.0_c_double", "integer(c_size_t)": "0"}
 
 
 @dataclass(frozen=True)
@@ -327,28 +325,3 @@ def _cython_member(member: Member) -> str:
         return f"{member.type} (*{member.name})({member.parameters}) noexcept nogil"
     dimensions = "".join(f"[{n}]" for n in member.dimensions)
     return f"{member.type} {'*' * member.pointer}{member.name}{dimensions}"
-
-
-def fortran(header: str) -> list[str]:
-    """Derived types that are interoperable with the structs. What is given to C, with pointers, is null and zero."""
-    known = dict(_CONSTANT.findall(header))
-    lines: list[str] = []
-    for struct in structs(header):
-        lines += ["", f"type, bind(c) :: {struct.name}"]
-        has_defaults = any(member.pointer for member in struct.members)
-        lines += [f"   {_fortran_member(member, known, has_defaults)}" for member in struct.members]
-        lines.append("end type")
-    return lines
-
-
-def _fortran_member(member: Member, lengths: dict[str, str], has_defaults: bool) -> str:
-    if member.parameters is not None:
-        return f"type(c_funptr) :: {member.name} = c_null_funptr"
-    if member.pointer:
-        return f"type(c_ptr) :: {member.name} = c_null_ptr"
-    kind = _FORTRAN.get(member.type)
-    if kind is None:
-        return f"type({member.type}) :: {member.name}"
-    sizes = ", ".join(lengths.get(n, n) for n in reversed(member.dimensions))
-    default = f" = {_ZEROS[kind]}" if has_defaults else ""
-    return f"{kind} :: {member.name}{f'({sizes})' if sizes else ''}{default}"

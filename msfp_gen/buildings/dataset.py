@@ -282,12 +282,10 @@ def _group_of(arrays: Arrays, dims: Dimensions) -> xr.Dataset:
     return xr.Dataset({name: (dims[name], values) for name, values in arrays.items()})
 
 
-def _arrays_in(root: StoredGroup, name: str, dims: Dimensions, sizes: Mapping[str, int], arrays: Arrays) -> Arrays:
-    """The arrays of the group `name`, as of `_group_of`; they are added to `arrays` by their paths in the file."""
+def _arrays_in(root: StoredGroup, name: str, dims: Dimensions, sizes: Mapping[str, int]) -> Arrays:
+    """The arrays of the group `name`, as of `_group_of`."""
     group = root.group(name)
-    of_group = {key: group.array(key, tuple(sizes[dim] for dim in dims_of)) for key, dims_of in dims.items()}
-    arrays |= {f"{name}/{key}": values for key, values in of_group.items()}
-    return of_group
+    return {key: group.array(key, tuple(sizes[dim] for dim in dims_of)) for key, dims_of in dims.items()}
 
 
 def edition() -> str:
@@ -295,37 +293,32 @@ def edition() -> str:
     return digest_of_names([*STORED, *DIMENSIONS])
 
 
-def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> dict[str, Any]:
+def fields_in(root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, Any]:
     """The fields of the `BuildingResult` in a file: scene, rows, extremes, counters and notes.
 
     As `ResultFiles.fields_in`.
     """
-    scene = _scene(root, about, arrays)
+    scene = _scene(root, about)
     sizes = SIZES | {dim: len(labels) for dim, labels in labels_of(scene).items()} | {"time": root.rows("time")}
     surfaces = np.array([bearing.layout.surfaces for bearing in scene.every_bearing])
     missing = np.arange(sizes["surface"]) >= surfaces[:, None]
     counters: dict[str, Any] = without(COUNTER, about)
     return {
         "scene": scene,
-        **stored_fields(root, STORED, sizes, arrays, missing),
+        **stored_fields(root, STORED, sizes, missing),
         "wall_time": counters.pop("wall_time"),
         "counters": counters,
         "monitored": notes_in(about),
-        "extremes": BuildingExtremes(**_arrays_in(root, EXTREMES, DIMENSIONS, sizes, arrays)),
+        "extremes": BuildingExtremes(**_arrays_in(root, EXTREMES, DIMENSIONS, sizes)),
     }
 
 
-def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> BuildingScene:
-    """The scene in a file. about, arrays: receive the attributes of motions and the arrays that were read."""
+def _scene(root: StoredGroup, about: Mapping[str, Attribute]) -> BuildingScene:
+    """The scene in a file."""
     text = str(about["scene"])
     table, size = toml_table(text), root.group(GROUP).rows("mass")
     sizes = {"row": size, "column": size, "freedom": FREEDOMS, "axis": 3}
     sizes |= {"node": len(table.get("node", [])), "storey": len(table.get("column", []))}
-    matrices = _arrays_in(root, GROUP, MATRICES, sizes, arrays)
-    motions = []
-    for index in range(int(table.get("grounds", 1))):
-        motion, pieces, motion_about = motion_in(root, ground_name(index))
-        arrays |= pieces
-        about |= motion_about
-        motions.append(motion)
+    matrices = _arrays_in(root, GROUP, MATRICES, sizes)
+    motions = [motion_in(root, ground_name(index)) for index in range(int(table.get("grounds", 1)))]
     return scene_from(text, matrices, motions)

@@ -443,9 +443,10 @@ class BearingResult(OneBearing):
             ("N over N at rest", summaries.ratios_text(s)),
         ]
 
-    def derived_and_groups(self) -> tuple[tuple[str, ...], dict[str, xr.Dataset]]:
-        """Nothing: the file of one bearing has the dataset alone, for other programs."""
-        return (), {}
+    @property
+    def groups(self) -> dict[str, xr.Dataset]:
+        """None: the file of one bearing has the dataset alone, for other programs."""
+        return {}
 
     @cached_property
     def dataset(self) -> xr.Dataset:

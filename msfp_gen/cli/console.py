@@ -266,11 +266,11 @@ def build(scene: System, gradients: bool = False) -> None:
 def run_scene(scene: Any, **options: Any) -> tuple[Any, RunError | None]:
     """Run a scene; its result (of a failed run as far as it was computed), and the error of a failed run."""
     from msfp_gen.scene.scene import Scene
-    from msfp_gen.simulation.memory import require_room
+    from msfp_gen.simulation.memory import require_memory
     from msfp_gen.simulation.simulate import simulate
 
     if isinstance(scene, Scene):
-        require_room(scene, options.get("stream"))
+        require_memory([scene])
     build(scene)
     with Progress(scene.name or "run") as progress:
         try:

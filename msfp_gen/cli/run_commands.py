@@ -29,7 +29,7 @@ from msfp_gen.cli.console import (
 )
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.fields import to_si
-from msfp_gen.common.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
+from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class CheckpointOptions:
 
     def hint(self, failure: RunError) -> str:
         """Text for the message of an interrupted run: how to continue it."""
-        return f"; continue with --resume {self.path}" if failure.status == "interrupted" and self._files else ""
+        return f"; continue with --resume {self.path}" if failure.status == "interrupted" and self._exists else ""
 
     @contextmanager
     def hint_on_write_error(self) -> Iterator[None]:
@@ -90,23 +90,18 @@ class CheckpointOptions:
         try:
             yield
         except OSError as error:
-            if not self._files:
+            if not self._exists:
                 raise
             raise RunError(f"{error}; the run is not lost: make room and give --resume {self.path}") from error
 
-    def remove_files(self) -> None:
+    def remove_file(self) -> None:
         """Remove the checkpoint, after all output is written."""
-        from msfp_gen.simulation.checkpoint import kept_rows
-
-        for file in [*self._files, *([] if self.path is None else kept_rows(self.path))]:
-            file.unlink(missing_ok=True)
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
 
     @property
-    def _files(self) -> list[Path]:
-        """Existing files of the checkpoint: one per segment of the run."""
-        from msfp_gen.simulation.checkpoint import checkpoint_files  # imported late: --help shall not import NumPy
-
-        return [] if self.path is None else checkpoint_files(self.path)
+    def _exists(self) -> bool:
+        return self.path is not None and self.path.is_file()
 
 
 NO_CHECKPOINT = CheckpointOptions()
@@ -182,7 +177,6 @@ app = typer.Typer()
     epilog="Example:\n\n\b\n  msfp-gen run fenz-test2 -o test2.nc --plot test2.png\n  msfp-gen run scene.toml --json\n"
     "  msfp-gen run scene.toml --error 0.5%   # estimate the error of the run, and the cost of a smaller one\n"
     "  msfp-gen run scene.toml -o out.mat   # or .nc, .csv, .parquet\n"
-    "  msfp-gen run scene.toml -o out.nc --stream   # rows stay on disk\n"
     "  msfp-gen run scene.toml -o out.nc --checkpoint run.ck\n  msfp-gen run scene.toml -o out.nc --resume run.ck"
 )
 def run(
@@ -207,9 +201,6 @@ def run(
     strict: Annotated[
         bool, typer.Option("--strict", help="Stop where an effect that the model leaves out becomes significant.")
     ] = False,
-    stream: Annotated[
-        bool, typer.Option("--stream", help="Keep the rows on disk, not in memory, and write all of them to --output.")
-    ] = False,
     error: TargetError = None,
     explain: Explain = False,
     budget: Budget = None,
@@ -220,20 +211,17 @@ def run(
     """Simulate a scene."""
     checkpoints = CheckpointOptions.of(checkpoint, every, resume)
     others = {"--rtol": rtol, "--method": method, "--checkpoint": checkpoint, "--resume": resume}
-    others["--stream"] = stream or None
     target = ErrorTarget.of(error, explain, budget, others)
     if output is not None:
         from msfp_gen.results.files import check_result_path
 
         check_result_path(output, "--output")
-    if stream and (output is None or output.suffix.lower() not in DATASET_SUFFIXES):
-        raise InputError("--stream: rows go to a netCDF file; give --output FILE.nc")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
     from msfp_gen.scene.file.source import load_scene
 
     chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
-    note_written(_run(chosen, output, plot, as_json, checkpoints, target, strict, stream))
+    note_written(_run(chosen, output, plot, as_json, checkpoints, target, strict))
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen demo -o out")
@@ -268,14 +256,10 @@ def _run(
     checkpoints: CheckpointOptions = NO_CHECKPOINT,
     target: ErrorTarget | None = None,
     strict: bool = False,
-    stream: bool = False,
 ) -> list[Path]:
-    """Simulate, print and save; returns the paths. A failed run is printed and saved before its error is raised.
-
-    stream: the run writes the output itself.
-    """
+    """Simulate, print and save; returns the paths. A failed run is printed and saved before its error is raised."""
     within = None if target is None else target.simulate(one_bearing(scene, f"--error = {target.error:g}"))
-    options = {"strict": strict} | checkpoints.arguments | ({"stream": output} if stream else {})
+    options = {"strict": strict} | checkpoints.arguments
     with checkpoints.hint_on_write_error():
         result, failure = run_scene(scene, **options) if within is None else (within.result, None)
     saved: list[Path] = []
@@ -284,12 +268,12 @@ def _run(
         if within is not None and not as_json:
             show(within.tables)
         with checkpoints.hint_on_write_error():
-            saved = _save(result, output, plot, written=stream)
+            saved = _save(result, output, plot)
     if failure is not None:
         files = f"; what was computed until then is in {' and '.join(map(str, saved))}" if saved else ""
         message = f"{failure}{files}{checkpoints.hint(failure)}"
         raise RunError(message, status=failure.status, result=result) from failure
-    checkpoints.remove_files()
+    checkpoints.remove_file()
     return saved
 
 
@@ -307,9 +291,9 @@ def _report(result: AnyResult, as_json: bool, more: dict[str, Any] | None = None
     note_exceeded({"": result.verdict})
 
 
-def _save(result: AnyResult, output: Path | None, plot: Path | None, written: bool = False) -> list[Path]:
-    """Write the result and the figure to the given paths; returns them. written: the result is there already."""
-    if output is not None and not written:
+def _save(result: AnyResult, output: Path | None, plot: Path | None) -> list[Path]:
+    """Write the result and the figure to the given paths; returns them."""
+    if output is not None:
         result.save(output)
     if plot is not None:
         from msfp_gen.figures import figures_of

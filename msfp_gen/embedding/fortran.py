@@ -1,8 +1,12 @@
-"""Fortran interfaces of the functions of `msfp.h`, emitted from the text of the header."""
+"""Types and interfaces of `msfp.h` in Fortran, emitted from the text of the header."""
 
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from msfp_gen.generator.interface import Member
 
 _PARAMETER = re.compile(r"(const )?(\w+) ?(\**)(\w+)")
 _TYPES = {
@@ -13,7 +17,36 @@ _TYPES = {
     "size_t": "integer(c_size_t)",
 }
 _LISTS = {"double", "int64_t", "msfp_variable", "msfp_trip"}  # types whose pointers are arrays
+_CONSTANT = re.compile(r"#define (\w+) (\d+)")
+_ZEROS = {"integer(c_int)": "0", "real(c_double)": "0.0_c_double", "integer(c_size_t)": "0"}
 _ON_A_LINE = 6  # parameters: a line of Fortran may have 132 characters
+
+
+def types(header: str) -> list[str]:
+    """Derived types that are interoperable with the structs. What is given to C, with pointers, is null and zero."""
+    from msfp_gen.generator.interface import structs  # it imports SymPy
+
+    known = dict(_CONSTANT.findall(header))
+    lines: list[str] = []
+    for struct in structs(header):
+        lines += ["", f"type, bind(c) :: {struct.name}"]
+        has_defaults = any(member.pointer for member in struct.members)
+        lines += [f"   {_member(member, known, has_defaults)}" for member in struct.members]
+        lines.append("end type")
+    return lines
+
+
+def _member(member: Member, lengths: dict[str, str], has_defaults: bool) -> str:
+    if member.parameters is not None:
+        return f"type(c_funptr) :: {member.name} = c_null_funptr"
+    if member.pointer:
+        return f"type(c_ptr) :: {member.name} = c_null_ptr"
+    kind = _TYPES.get(member.type)
+    if kind is None:
+        return f"type({member.type}) :: {member.name}"
+    sizes = ", ".join(lengths.get(n, n) for n in reversed(member.dimensions))
+    default = f" = {_ZEROS[kind]}" if has_defaults else ""
+    return f"{kind} :: {member.name}{f'({sizes})' if sizes else ''}{default}"
 
 
 def interfaces(header: str) -> list[str]:

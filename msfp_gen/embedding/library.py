@@ -129,7 +129,7 @@ def _content(models: dict[str, ModelSpec], platform: Platform, target: str | Non
         "body": contract.names(contract.BODY),
         "top": contract.names(contract.TOP),
         "words": word_enums(),
-        "types": interface.fortran(public_header()),
+        "types": fortran.types(public_header()),
         "interfaces": fortran.interfaces(public_header()),
         "functions": interface.functions(public_header()),
         "errors": CALL_ERRORS,

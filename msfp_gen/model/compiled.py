@@ -97,11 +97,11 @@ class AnyRun(Protocol):
 
     @property
     def row_count(self) -> int:
-        """Number of rows held: those recorded, less those dropped."""
+        """Number of rows recorded."""
 
     @property
     def rows(self) -> Array:
-        """Rows held, shape (T, row size) [SI]."""
+        """Rows, shape (T, row size) [SI]."""
 
     def restore(self, snapshot: bytes) -> None:
         """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
@@ -123,18 +123,11 @@ class Run(AnyRun, Protocol):
         """Extremes over all accepted steps, one number after the other, shape (extremes size,) [SI]."""
 
     @property
-    def dropped_rows(self) -> int:
-        """Number of rows dropped."""
-
-    @property
     def events(self) -> list[EventRow]:
         """Time, surface, kind, displacement and top force of every event."""
 
-    def advance(self, steps: int = 2000, rows: int = 0) -> bool:
-        """Take at most `steps` steps, fewer once so many `rows` are held (0: any); False where the run has ended."""
-
-    def drop_rows(self) -> None:
-        """Forget all rows but the last, which the caller has stored elsewhere."""
+    def advance(self, steps: int = 2000) -> bool:
+        """Take at most `steps` steps; False where the run has ended."""
 
     def record_now(self) -> None:
         """Record a row of the current state, unless there is one."""

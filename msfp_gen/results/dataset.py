@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, asdict, fields, replace
 from functools import lru_cache, singledispatch
 from typing import TYPE_CHECKING, Any
@@ -72,7 +72,6 @@ BELOW = {  # of a bearing of a building
     name: Variable(("time",), "J", meaning, name)
     for name, meaning in ((f"energy_{name}", meaning) for name, meaning in ENERGY_BELOW.items())
 }
-DERIVED: dict[str, Any] = {}  # all variables are read
 
 
 def to_dataset(result: RunData) -> xr.Dataset:
@@ -139,30 +138,28 @@ def edition() -> str:
     return digest_of_names([*VARIABLES, *LABELS.items(), [field.name for field in fields(Counters)], WORDS])
 
 
-def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> dict[str, Any]:
+def fields_in(root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, Any]:
     """Scene, rows, events, counters, notes, extremes and derivatives, as `ResultFiles.fields_in`."""
-    scene = _scene(root, about, arrays)
+    scene = _scene(root, about)
     surfaces = scene.bearing.layout.surfaces
     sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}
     sizes |= {"time": root.rows("time"), "event": root.rows("event_time")}
     variables = {name: v for name, v in VARIABLES.items() if v.field not in OPTIONAL or name in root}
-    read = stored_fields(root, variables, sizes, arrays)
+    read = stored_fields(root, variables, sizes)
     energy = {name: read.pop(f"energy_{name}") for name in ENERGY}
     history = History(**{field: read[field] for field in quantities() if field in read}, energy=energy)
     return {
         "scene": scene,
         "history": history,
         "events": _events(read, surfaces),
-        "gradients": _gradients(root, history, sizes, about, arrays),
+        "gradients": _gradients(root, history, sizes),
         "counters": Counters(**without(COUNTER, about)),  # type: ignore[arg-type]
         "notes": notes_in(about),
         "recorded_extremes": _extremes(json.loads(str(about["extremes"])), surfaces) if "extremes" in about else None,
     }
 
 
-def _gradients(
-    root: StoredGroup, history: History, sizes: dict[str, int], about: dict[str, Attribute], arrays: Arrays
-) -> Gradients | None:
+def _gradients(root: StoredGroup, history: History, sizes: dict[str, int]) -> Gradients | None:
     """The derivatives with respect to parameters, where the file has some."""
     if GRADIENT not in root:
         return None
@@ -170,7 +167,6 @@ def _gradients(
     attributes = group.attributes(lambda name: name in ("parameters", "extremes", f"extremes{ERROR}"))
     parameters = tuple(_parameter(table) for table in json.loads(str(attributes["parameters"])))
     sizes = {**sizes, PARAMETER: len(parameters)}
-    about |= {f"{GRADIENT}/{name}": value for name, value in attributes.items()}
     quantity = {name for name, variable in ROWS.items() if variable.field in quantities()} - {"time"}
     terms = energy_terms("energy_input" in group, "energy_seat_stored" in group)
     energies = [f"energy_{name}" for name in terms]
@@ -181,7 +177,7 @@ def _gradients(
             raise ValueError("the derivatives of the extremes are not those of the parameters")
         rows = [name for name in ROWS if name in quantity and name + suffix in group]
         variables = {f"{name}{suffix}": _derivative(VARIABLES[name]) for name in (*rows, *energies, *EVENTS)}
-        read = stored_fields(group, variables, sizes, arrays, path=f"{GRADIENT}/")
+        read = stored_fields(group, variables, sizes)
         return Gradients(parameters, read, extremes, error)
 
     derivatives = gradients(error=gradients(ERROR) if f"extremes{ERROR}" in attributes else None)
@@ -198,16 +194,14 @@ def _parameter(table: dict[str, Any]) -> Parameter:
     return parameter
 
 
-def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> Scene:
+def _scene(root: StoredGroup, about: Mapping[str, Attribute]) -> Scene:
     """The scene of the file; its motion is in the scene, or as polynomials in a group of the file."""
     from msfp_gen.scene.file.loader import scene_from_table, toml_table
     from msfp_gen.scene.file.stored_motion import PIECES, RECIPE
 
     table, motion = toml_table(str(about["scene"])), None
     if about["motion"] == PIECES:
-        motion, pieces, motion_about = motion_in(root)
-        arrays |= pieces
-        about |= motion_about
+        motion = motion_in(root)
     elif about["motion"] != RECIPE:
         raise ValueError(f"motion = {about['motion']!r} is unknown")
     elif isinstance(table.get("motion"), dict) and table["motion"].get("file") is not None:

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
-from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
@@ -26,7 +25,7 @@ from msfp_gen.common.tables import TABLE_SUFFIXES, parquet_bytes
 from msfp_gen.motions.motion import Motion
 from msfp_gen.results.note import Note
 from msfp_gen.results.sign import DEFAULT, SIGNED, sign_of
-from msfp_gen.results.stored_group import ArrayDigest, Attribute, StoredGroup, digest, seal, stored_groups
+from msfp_gen.results.stored_group import Attribute, StoredGroup, stored_groups
 from msfp_gen.results.variables import Arrays, Places, columns_of
 
 if TYPE_CHECKING:
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 
 
 COUNTER, PROVENANCE = "counter_", "provenance_"  # prefixes of the attributes with counters and provenance
-DIGEST = "digest"  # attribute: of all values that are read
 EDITION = "edition"  # attribute: of the names in a file; that of another version of msfp-gen differs if these do
 WORDS = ("scene", "motion", "status", "message", "notes")  # attributes that are texts
 KINDS = {  # of results, by the attribute `source`: what they are of, and how they are read
@@ -51,8 +49,6 @@ F = TypeVar("F", bound="ResultFiles")
 class Storage(Protocol):
     """A module that makes the dataset of one kind of result, and reads its files."""
 
-    DERIVED: dict[str, Any]  # variables of the dataset that follow from the others: they are written but not read
-
     def to_dataset(self, result: Any) -> xr.Dataset:
         """The dataset of a result."""
 
@@ -68,11 +64,10 @@ class Storage(Protocol):
     def edition(self) -> str:
         """A digest of the names that a file of this version has."""
 
-    def fields_in(self, root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> dict[str, Any]:
+    def fields_in(self, root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, Any]:
         """The fields of the result from a file, except status, message and provenance.
 
-        about: attributes of the file; arrays: takes the arrays that were read, by their paths in the file. Raises
-        InputError, or what `DAMAGE` lists.
+        about: attributes of the file. Raises InputError, or what `DAMAGE` lists.
         """
 
 
@@ -91,9 +86,10 @@ class ResultFiles:
         """Rows, and events, as an xarray.Dataset, with units, meanings and signs in attributes; built at first use."""
         return self.storage.to_dataset(self)
 
-    def derived_and_groups(self) -> tuple[Collection[str], dict[str, xr.Dataset]]:
-        """Variables of the dataset that follow from the others, and the groups of the netCDF-4 file beside it."""
-        return self.storage.DERIVED, self.storage.groups_of(self)
+    @property
+    def groups(self) -> dict[str, xr.Dataset]:
+        """The groups of the netCDF-4 file beside the dataset, by name."""
+        return self.storage.groups_of(self)
 
     if TYPE_CHECKING:  # fields of the subclasses, or properties
 
@@ -139,15 +135,14 @@ class ResultFiles:
         from xarray.backends import H5NetCDFStore
 
         path = check_output(path, DATASET_SUFFIXES)
-        derived, groups = self.derived_and_groups()
-        value = digest_of_dataset(self.dataset.drop_vars(derived, errors="ignore"), groups)
-        dataset = self.dataset.assign_attrs({DIGEST: value})
+        dataset = self.dataset
         # The file is made in memory, because HDF5 crashes instead of raising an error when the disk is full.
         content = BytesIO()
         with h5netcdf.File(content, "w") as file:
             dataset.dump_to_store(H5NetCDFStore(file), encoding=_encoding(dataset))
-            dump_groups(file, groups)
-        write_bytes(path, [content.getbuffer(), seal(sha256(content.getbuffer()))])
+            for name, group in self.groups.items():
+                group.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(group))
+        write_bytes(path, [content.getbuffer()])
         return path
 
     def to_csv(self, path: str | Path, columns: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
@@ -341,45 +336,23 @@ def attributes_of(
     }
 
 
-def dump_groups(file: Any, groups: Mapping[str, xr.Dataset]) -> None:
-    """Write datasets as groups of an open file."""
-    from xarray.backends import H5NetCDFStore
-
-    for name, group in groups.items():
-        group.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(group))
-
-
 def _encoding(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
-    """Compression of rows and of the pieces of a motion.
+    """Checksums of all numbers, and compression of rows and of the pieces of a motion.
 
     The lowest compression level suffices: histories of stuck surfaces and of rims repeat most values.
     """
     from msfp_gen.scene.file.stored_motion import COMPRESSED
 
-    rows = {name for name, values in dataset.data_vars.items() if "time" in values.dims and values.size}
-    encoding: dict[Hashable, dict[str, Any]] = {name: {"zlib": True, "complevel": 1} for name in rows}
-    return encoding | {name: options for name, options in COMPRESSED.items() if name in dataset}
-
-
-def digest_of_dataset(
-    dataset: xr.Dataset, groups: Mapping[str, xr.Dataset], rows: Mapping[str, ArrayDigest] | None = None
-) -> str:
-    """The digest of the values that `read_result` reads, also in groups of the file by name.
-
-    rows: of what was written in blocks, instead of `dataset`.
-    """
-    arrays: Arrays = {str(name): variable.to_numpy() for name, variable in dataset.data_vars.items()}
-    arrays["time"] = dataset["time"].to_numpy()
-    about = dict(dataset.attrs)
-    arrays |= rows or {}
-    for name, group in groups.items():
-        arrays |= {f"{name}/{key}": variable.to_numpy() for key, variable in group.data_vars.items()}
-        about |= {f"{name}/{key}": value for key, value in group.attrs.items()}
-    return digest({name: value for name, value in about.items() if _is_read(name)}, arrays)
+    encoding: dict[Hashable, dict[str, Any]] = {}
+    for name, values in dataset.variables.items():
+        if values.size and values.dims and values.dtype.kind in "if":
+            compressed = name in COMPRESSED or (name in dataset.data_vars and "time" in values.dims)
+            encoding[name] = {"fletcher32": True} | ({"zlib": True, "complevel": 1} if compressed else {})
+    return encoding
 
 
 def _is_read(name: str) -> bool:
-    return name in (*WORDS, "extremes", "fidelity") or name.startswith((COUNTER, PROVENANCE, "motion", "gradient/"))
+    return name in (*WORDS, "source", EDITION, "extremes", "fidelity") or name.startswith((COUNTER, PROVENANCE))
 
 
 def read_result(path: str | Path, *kinds: type[F]) -> F:
@@ -399,7 +372,7 @@ def read_result(path: str | Path, *kinds: type[F]) -> F:
 
 
 def _result_in(root: StoredGroup, kinds: Sequence[type[F]]) -> F:
-    about = root.attributes(lambda name: name in ("source", DIGEST, EDITION) or _is_read(name))
+    about = root.attributes(_is_read)
     source, edition = about.pop("source", None), about.pop(EDITION, None)
     kind = next((kind for kind in kinds if kind.source == source and hasattr(kind, "storage")), None)
     if kind is None:
@@ -419,12 +392,9 @@ def _result_in(root: StoredGroup, kinds: Sequence[type[F]]) -> F:
 def _read(root: StoredGroup, about: dict[str, Attribute], kind: type[F]) -> F:
     if not all(isinstance(about.get(name), str) for name in WORDS):
         raise ValueError(f"an attribute of {', '.join(WORDS)} is no text")
-    written, arrays = about.pop(DIGEST, None), dict[str, Any]()
-    fields = kind.storage.fields_in(root, about, arrays)
+    fields = kind.storage.fields_in(root, about)
     if not str(about["status"]).isidentifier():
         raise ValueError(f"status = {about['status']!r} is no word")
-    if written is not None and written != digest(about, arrays):  # another program may have left it out
-        raise InputError("a value was changed after this file was written; run the scene again")
     for name, value in without(COUNTER, about).items():
         if not isinstance(value, float if name == "wall_time" else int) or not 0 <= value < math.inf:
             raise ValueError(f"attribute {COUNTER}{name} is no count")
@@ -449,15 +419,12 @@ def notes_in(about: Mapping[str, Attribute]) -> tuple[Note, ...]:
     return notes
 
 
-def motion_in(root: StoredGroup, name: str = "motion") -> tuple[Motion, Arrays, dict[str, Attribute]]:
-    """The motion that a group of a file has as polynomials, its arrays and attributes by their paths in the file."""
+def motion_in(root: StoredGroup, name: str = "motion") -> Motion:
+    """The motion that a group of a file has as polynomials."""
     from msfp_gen.scene.file.stored_motion import from_pieces
 
     group = root.group(name)
     count = group.rows("knots")
     shapes = {"knots": (count,), "coefficients": (max(0, count - 1), 6, 6), "jumps": (group.rows("jumps"),)}
     pieces = {key: group.array(key, shape, compressed=key != "knots") for key, shape in shapes.items()}
-    about = group.attributes(lambda key: key in ("name", "metadata", "max_step"))
-    motion = from_pieces(pieces, about)
-    arrays, named = ({f"{name}/{key}": value for key, value in values.items()} for values in (pieces, about))
-    return motion, arrays, named
+    return from_pieces(pieces, group.attributes(lambda key: key in ("name", "metadata", "max_step")))

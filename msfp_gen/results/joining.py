@@ -1,13 +1,8 @@
-"""The histories of consecutive segments as one, and a selection of the rows of a long run: whole or block by block.
-
-Both give the same numbers whether a run is in memory or read block by block from a file. A selection fits into memory
-and keeps the extremes: of every group of rows the first is kept, and that of the fastest slip, so that no short sliding
-is missed; and the rows of all extremes.
-"""
+"""The histories of consecutive segments as one, and rows at other times."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -18,7 +13,7 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.files import ResultFiles
-from msfp_gen.results.history import History, first_peak, quantities
+from msfp_gen.results.history import History, quantities
 
 Ends = tuple[History, History]
 
@@ -119,59 +114,6 @@ def concatenated(parts: Sequence[History]) -> History:
 
     columns: dict[str, Any] = {name: whole([getattr(part, name) for part in parts]) for name in parts[0].arrays()}
     return History(**columns, energy={name: whole([part.energy[name] for part in parts]) for name in parts[0].energy})
-
-
-BLOCK = 2**13  # rows that are looked at together
-GROUPS = 2**15  # most groups; a run of up to twice as many rows is kept whole
-
-Reader = Callable[[int, int], History]
-
-
-def thinned(count: int, rows: Reader) -> History:
-    """At most about 2 `GROUPS` of `count` rows. rows: gives those from one number to another."""
-    if count <= 2 * GROUPS:
-        return rows(0, count)
-    group = 2 ** int(np.ceil(np.log2(count / GROUPS)))
-    kept: list[History] = []
-    extremes: History | None = None
-    for block in blocks(count, rows, max(BLOCK, group)):
-        kept.append(taken(block, _of_groups(block, group)))
-        candidates = block if extremes is None else concatenated([extremes, block])
-        extremes = taken(candidates, _of_extremes(candidates))
-    assert extremes is not None
-    regular = concatenated(kept)
-    others = ~np.isin(extremes.time, regular.time)
-    return concatenated([regular, taken(extremes, others)]) if others.any() else regular
-
-
-def thinned_history(history: History) -> History:
-    """`thinned` for rows that are in memory."""
-    if len(history.time) <= 2 * GROUPS:
-        return history
-    return thinned(len(history.time), lambda start, end: taken(history, slice(start, end)))
-
-
-def blocks(count: int, rows: Reader, size: int = BLOCK) -> Iterator[History]:
-    """`count` rows in blocks of `size`; the last is shorter."""
-    for start in range(0, count, size):
-        yield rows(start, min(start + size, count))
-
-
-def _of_groups(block: History, group: int) -> Any:
-    """Rows of a block: the first of each group, and that of the fastest slip."""
-    speed = np.square(block.slip_velocity).sum(axis=2).max(axis=1)
-    starts = np.arange(0, len(speed), group)
-    fastest = [start + int(speed[start : start + group].argmax()) for start in starts]
-    return np.union1d(starts, fastest)
-
-
-def _of_extremes(rows: History) -> Any:
-    """Rows with the least and the largest of each number, the first of equal ones, and the ends."""
-    chosen = [0, len(rows.time) - 1]
-    numbers = [values for name, values in rows.arrays().items() if name != "time"] + list(rows.energy.values())
-    for column in np.concatenate([values.reshape(len(values), -1) for values in numbers], axis=1).T:
-        chosen += [int(column.argmin()), int(column.argmax())]
-    return np.unique([*chosen, int(rows.horizontal.argmax()), first_peak(rows.horizontal)])
 
 
 R = TypeVar("R", bound=ResultFiles)

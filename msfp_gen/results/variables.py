@@ -85,14 +85,11 @@ def stored_fields(
     group: StoredGroup,
     variables: Variables,
     sizes: Mapping[str, int],
-    arrays: Arrays,
     missing: Any = None,
-    path: str = "",
 ) -> Arrays:
     """The arrays of a result by field, from the variables in a group of its file. Raises ValueError: not as expected.
 
-    sizes: of the dimensions. arrays: takes the variables, by their paths in the file. missing: True where a bearing has
-    no such surface, and the values are NaN. path: of the group.
+    sizes: of the dimensions. missing: True where a bearing has no such surface, and the values are NaN.
     """
     fields: Arrays = {}
     for name, variable in variables.items():
@@ -104,7 +101,6 @@ def stored_fields(
             unknown = missing is not None and variable.dims[1:] == SURFACES
             if not (np.isfinite(values) | (missing if unknown else False)).all():
                 raise ValueError(f"{name} is not finite")
-        arrays[f"{path}{name}"] = values
         if variable.part and variable.field not in fields:
             fields[variable.field] = np.empty([sizes[dim] for dim in variable.whole])
         if variable.part:

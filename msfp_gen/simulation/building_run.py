@@ -191,7 +191,6 @@ class BuildingRun:
     grounds: list[Motion]
     build: str
     changes: list[Change] = field(default_factory=list)
-    dropped_rows = 0  # it keeps all rows
 
     @property
     def time(self) -> float:

@@ -264,7 +264,7 @@ CONTACT_IN_LONG_STEP = (
 
 
 def gradient_parameters(
-    scene: Scene, paths: Sequence[str], checkpoint: object = None, stream: object = None, energies: bool = False
+    scene: Scene, paths: Sequence[str], checkpoint: object = None, energies: bool = False
 ) -> tuple[Parameter, ...]:
     """The parameters at some paths. Raises InputError for an unknown one, and for a run that has no gradients."""
     parameters = parameters_of(scene, paths)
@@ -287,8 +287,6 @@ def gradient_parameters(
         )
     if checkpoint is not None:
         raise InputError(f"checkpoint = {str(checkpoint)!r}: a checkpoint holds no gradients; leave out one of them")
-    if stream is not None:
-        raise InputError(f"stream = {str(stream)!r}: gradients are kept in memory; leave out one of them")
     return parameters
 
 

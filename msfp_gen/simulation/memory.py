@@ -1,14 +1,13 @@
 """Memory of runs: what their rows need, what there is, and the refusal of runs that cannot fit.
 
-All rows of a run lie in memory until its result is written, unless they are streamed to disk. Rows at even times are
-counted before a run, and the least number of steps where a longest step is given; rows are watched while a run goes on.
+All rows of a run lie in memory until its result is written. Rows at even times are counted before a run, and the least
+number of steps where a longest step is given; rows are watched while a run goes on.
 """
 
 from __future__ import annotations
 
 import math
 import os
-import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -39,19 +38,8 @@ def require_memory(scenes: Sequence[Scene]) -> None:
     runs = f"{len(scenes)} runs" if len(scenes) > 1 else f"{worst.end / step:.1e} rows"
     raise InputError(
         f"{_named(worst)}: {runs} need {needed / GB:.3g} GB of memory and {max(room, 0.0) / GB:.3g} GB are available; "
-        f"{_remedy(worst, needed / max(room, SMALL))}, a shorter duration, or stream the rows to disk"
+        f"{_remedy(worst, needed / max(room, SMALL))}, or a shorter duration"
     )
-
-
-def require_room(scene: Scene, stream: Path | None, copies: int = 1) -> None:
-    """Raise InputError where the rows of a scene at even times do not fit into memory, or on the disk of `stream`.
-
-    copies: numbers kept of each quantity, its derivatives included.
-    """
-    if stream is None:
-        require_memory([scene] * copies)
-    elif _row_step(scene) < math.inf:
-        _require_disk(scene, stream.parent)
 
 
 def outgrown(rows: int, surfaces: int) -> bool:
@@ -74,17 +62,6 @@ def available() -> float:
     MSFP_GEN_MEMORY leaves. Raises InputError where that variable is no positive number.
     """
     return min(_of_machine(), _of_group(), _of_process(), _of_variable())
-
-
-def _require_disk(scene: Scene, folder: Path) -> None:
-    """Rows lie on the disk as they are until the result, which is smaller, is written beside them."""
-    count, room = 1 + scene.end / _row_step(scene), shutil.disk_usage(folder).free
-    needed = count * row_size(scene.bearing.layout.surfaces)
-    if needed > max(room, SMALL):
-        raise InputError(
-            f"{_named(scene)}: {count:.1e} rows need {needed / GB:.3g} GB on the disk of {str(folder)!r} and "
-            f"{room / GB:.3g} GB are free; {_remedy(scene, needed / max(room, SMALL))}, or a shorter duration"
-        )
 
 
 def _needed(scene: Scene) -> float:

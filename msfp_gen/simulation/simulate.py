@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, overload
 
@@ -19,11 +18,10 @@ from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.identity import fingerprint
-from msfp_gen.common.output import DATASET_SUFFIXES, check_output
 from msfp_gen.model.compiled import Run
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.results.history import Counters, History
-from msfp_gen.results.joining import joined, thinned_history
+from msfp_gen.results.joining import joined
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_switching import check, next_effects, stopping_monitors
@@ -38,9 +36,6 @@ from msfp_gen.simulation.checkpoint import (
     Checkpoint,
     Identity,
     Resumable,
-    checkpoint_files,
-    require_no_checkpoint,
-    segment_file,
 )
 from msfp_gen.simulation.gradients import (
     INEXACT,
@@ -51,7 +46,7 @@ from msfp_gen.simulation.gradients import (
     switching_error,
     with_gradient_errors,
 )
-from msfp_gen.simulation.memory import outgrown, require_room
+from msfp_gen.simulation.memory import outgrown, require_memory
 from msfp_gen.simulation.outcome import (
     Progress,
     extremes_of,
@@ -62,14 +57,10 @@ from msfp_gen.simulation.outcome import (
     stopped,
 )
 from msfp_gen.simulation.rows import (
-    ROWS_HELD,
-    RowFile,
     Segment,
-    StreamedRows,
     events_of,
     finite_rows,
     history_of,
-    rows_beside,
     start_temperatures,
 )
 from msfp_gen.simulation.start import (
@@ -109,7 +100,6 @@ def simulate(
     every: float = ...,
     resume: bool = False,
     strict: bool = False,
-    stream: str | Path | None = None,
     gradients: Sequence[str] = (),
     energy_gradients: bool = False,
     gradient_errors: bool = True,
@@ -128,7 +118,6 @@ def simulate(
     every: float = EVERY,
     resume: bool = False,
     strict: bool = False,
-    stream: str | Path | None = None,
     gradients: Sequence[str] = (),
     energy_gradients: bool = False,
     gradient_errors: bool = True,
@@ -153,9 +142,6 @@ def simulate(
     strict
         Stop where a monitor trips (status `monitor`), instead of continuing with a model that includes the effect
         (`Auto`) or with a note in the result (`Effects`): docs/effects.md.
-    stream
-        File (.nc) to which all rows are written, with the rest of the result, whether the run succeeds or not. They lie
-        on disk while it runs, so that its memory does not grow with their number.
     gradients
         Paths of parameters (`bearing.surfaces[*].friction`) by which the run is differentiated: docs/gradients.md.
     energy_gradients
@@ -169,31 +155,26 @@ def simulate(
     Returns
     -------
     Result, or BuildingResult of a building
-        Rows, events, counters and notes of the run. With `stream`, of many rows a selection that fits into memory, with
-        the extremes of all (`results.joining`).
+        Rows, events, counters and notes of the run.
 
     Raises
     ------
     InputError
-        The method does not support the effects; the rows do not fit into memory, or on the disk; the checkpoint is
-        damaged, or of another scene or build; `stream` is no name of a result; a parameter does not exist, or the run
-        has no gradients; an option is none of this scene.
+        The method does not support the effects; the rows do not fit into memory; the checkpoint is damaged, or
+        of another scene or build; a parameter does not exist, or the run has no gradients; an option is none of this
+        scene.
     RunError
         The run failed: the message gives time, bearing, surface and cause, `.result` has the rows until then.
-    OSError
-        The disk is too full for the rows to be streamed.
 
     """
     if getattr(scene, "fidelity", "") == "backbone":
         raise InputError("fidelity = 'backbone': only studies run it, it keeps no history; give 'equivalent'")
     if checkpoint is None and resume:
         raise InputError("resume: needs the checkpoint to resume from; give checkpoint")
-    if checkpoint is not None and not resume:
-        require_no_checkpoint(checkpoint)
     if isinstance(scene, BuildingScene):
         options = {
-            "strict": strict, "stream": stream is not None, "gradients": bool(gradients),
-            "energy_gradients": energy_gradients, "gradient_errors": not gradient_errors,
+            "strict": strict, "gradients": bool(gradients), "energy_gradients": energy_gradients,
+            "gradient_errors": not gradient_errors,
         }  # fmt: skip
         if unknown := [name for name, value in options.items() if value]:
             raise InputError(f"{unknown[0]}: the run of a building has no such option; leave it out")
@@ -202,16 +183,12 @@ def simulate(
         raise InputError(f"scene: a {type(scene).__name__} is no scene; give what load_scene returns")
     if threads is not None:
         raise InputError("threads: the run of one bearing has no such option; leave it out")
-    file = None if stream is None else check_output(stream, DATASET_SUFFIXES, "stream")
-    parameters = gradient_parameters(scene, gradients, checkpoint, stream, energy_gradients)
-    require_room(scene, file, copies=1 + len(parameters))
-    sequence = replace(RunSequence.of(scene, strict, parameters), stream=file, energies=energy_gradients)
+    parameters = gradient_parameters(scene, gradients, checkpoint, energy_gradients)
+    require_memory([scene] * (1 + len(parameters)))
+    sequence = replace(RunSequence.of(scene, strict, parameters), energies=energy_gradients)
+    saved = None if checkpoint is None else Checkpoint(checkpoint, Identity.of(sequence.settled), every, resume)
     while sequence.effects is not None:
-        segments = sequence.segments
-        saved = None if checkpoint is None else segment_file(checkpoint, len(segments))
-        # Later segments have no file yet where the earlier process ended in a previous one.
-        resumed = resume and saved is not None and (saved.exists() or not (segments or checkpoint_files(saved)))
-        sequence.run_segment(progress, saved, every, resumed)
+        sequence.run_segment(progress, saved)
     result = sequence.result()
     if not result.succeeded:
         raise RunError(result.message, status=result.status, result=result)
@@ -236,9 +213,9 @@ class RunSequence:
     """The segments of a run that have ended, and the effects of the next one.
 
     scene: that of the user. settled: the same with the initial state after settling. effects: of the next segment;
-    None: the run has ended. notes: those of the segments that have ended. stream: the file to which all rows go.
-    parameters: of the derivatives; energies: whether these include energies that are integrals over the run. start: the
-    derivatives of the state after settling, as of `start_slopes`; None: the run starts as the scene says.
+    None: the run has ended. notes: those of the segments that have ended. parameters: of the derivatives; energies:
+    whether these include energies that are integrals over the run. start: the derivatives of the state after settling,
+    as of `start_slopes`; None: the run starts as the scene says.
     """
 
     scene: Scene
@@ -247,7 +224,6 @@ class RunSequence:
     effects: Effects | None
     segments: list[Segment]
     notes: list[Note]
-    stream: Path | None = None
     parameters: tuple[Parameter, ...] = ()
     energies: bool = False
     start: tuple[Array, Array] | None = None
@@ -271,44 +247,39 @@ class RunSequence:
             start_gradients(run, scene, model, self.parameters, energies=self.energies, start=self.start)
         return run, azimuth
 
-    def run_segment(
-        self, progress: Progress | None = None, saved: Path | None = None, every: float = EVERY, resume: bool = False
-    ) -> None:
+    def run_segment(self, progress: Progress | None = None, checkpoint: Checkpoint | None = None) -> None:
         """Build the next model and run it to its end, add its notes, and determine the effects of the segment after it.
 
-        saved: file of its checkpoint. every: seconds between two of them. resume: continue from it.
+        checkpoint: of the run, from which the segment continues if it has it.
         """
         scene, effects = self.settled, self.effects
         assert effects is not None
         check(scene, effects)
         start = time.perf_counter()
         model = build_model(scene.bearing.layout, effects, gradients=bool(self.parameters))
-        checkpoint = None if saved is None else Checkpoint(saved, Identity.of(scene, model), every, resume)
-        stored = None
-        if self.stream is not None:
-            path = None if saved is None else rows_beside(saved)
-            stored = RowFile(path, self.stream.parent, model.extension.ROW_SIZE, resume)
         run, azimuth = self.start_segment(model)
         if checkpoint is not None:
-            checkpoint.restore(run, stored)
+            checkpoint.begin(run, model.info.key)
         ready = time.perf_counter()
         earlier, copies = sum(segment.run.row_count for segment in self.segments), 1 + len(self.parameters)
 
         def step() -> bool:
-            return run.advance(STEPS_PER_CALL, 0 if stored is None else ROWS_HELD)
+            return run.advance(STEPS_PER_CALL)
 
         def is_full() -> bool:
             return outgrown(copies * (earlier + run.row_count), scene.bearing.layout.surfaces)
 
-        status = _advance(run, step, scene.end, progress, checkpoint, stored, is_full)
+        status = _advance(run, step, scene.end, progress, checkpoint, is_full)
         wall = time.perf_counter() - ready + (checkpoint.wall if checkpoint is not None else 0.0)
-        segment = Segment(model, run, azimuth, status, wall, ready - start, stored)
+        segment = Segment(model, run, azimuth, status, wall, ready - start)
         self.segments.append(segment)
         following = None if self.strict else next_effects(scene, segment.ending)
         notes = monitor_notes(segment.ending, following)
         self.notes = joined_notes(self.notes, notes)
         if self.parameters and following is not None:
             raise switching_error(segment, notes)
+        if checkpoint is not None and following is not None:
+            checkpoint.end(run)
         self.effects = following
 
     def result(self, with_initial_row: bool = False) -> Result:
@@ -317,10 +288,6 @@ class RunSequence:
         with_initial_row: record the initial state of a run that failed before its first row, if that state is finite.
         """
         last = self.segments[-1]
-        if self.stream is not None:
-            rows_on_disk = StreamedRows(self.segments, self.scene)
-            if rows_on_disk.count:
-                return rows_on_disk.written(partial(_result, self), self.stream)
         if with_initial_row and not any(segment.run.row_count for segment in self.segments):
             last.run.record_now()
         parts = [(s, rows) for s in self.segments if len(rows := finite_rows(s.run.rows))]
@@ -366,30 +333,27 @@ def _advance(
     end: float,
     progress: Progress | None,
     checkpoint: Checkpoint | None,
-    rows: RowFile | None = None,
     is_full: Callable[[], bool] | None = None,
 ) -> str:
     """Take all steps of a run; its status: "interrupted" after Ctrl-C, "memory" where it is full.
 
-    step: some steps; False: they were the last. end: of the run [s]. rows: take those of a run that streams them.
+    step: some steps; False: they were the last. end: of the run [s].
     """
     status = ""
     try:
         while step():
-            if rows is not None:
-                rows.take(run)  # type: ignore[arg-type]
-            elif is_full is not None and is_full():
+            if is_full is not None and is_full():
                 status = "memory"
                 break
             if checkpoint is not None:
-                checkpoint.save_if_due(run, rows)
+                checkpoint.save_if_due(run)
             if progress is not None:
                 progress(run.time, end)
     except KeyboardInterrupt:
         status = "interrupted"
     # After a failure the last checkpoint is kept: resumed from there, the run fails again in the same way.
     if checkpoint is not None and run.status[0] in ("ok", "stopped"):
-        checkpoint.save(run, rows)
+        checkpoint.save(run)
     return status or str(run.status[0])
 
 
@@ -408,7 +372,7 @@ def _result(sequence: RunSequence, history: History) -> Result:
         provenance=provenance_of(scene.solver, ", then ".join(segment.model.spec.key for segment in segments))
         | {"build_seconds": f"{sum(segment.setup for segment in segments):.3g}"},
         notes=tuple(sequence.notes)
-        + history_notes(scene, last.model.effects, thinned_history(history), total.steps)
+        + history_notes(scene, last.model.effects, history, total.steps)
         + landing_notes(events)
         + (gradient_notes(scene, last.model.effects, events) if parameters else ()),
         recorded_extremes=extremes_of(segments),
@@ -431,9 +395,9 @@ def _simulate_building(
     saved = None
     if checkpoint is not None:
         motion = {"name": scene.motion.name, "duration": scene.motion.duration}
-        identity = Identity(run.build, scene_text(scene) + dumps({"motion": motion}), fingerprint(scene))
+        identity = Identity(scene_text(scene) + dumps({"motion": motion}), fingerprint(scene))
         saved = Checkpoint(checkpoint, identity, every, resume)
-        saved.restore(run)
+        saved.begin(run, run.build)
     begin = time.perf_counter()
     status = _advance(run, lambda: run.run.advance(BUILDING_STEPS_PER_CALL) or run.switch(), scene.end, progress, saved)
     wall = time.perf_counter() - begin + (0.0 if saved is None else saved.wall)

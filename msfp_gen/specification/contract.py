@@ -296,9 +296,7 @@ STATUSES = (
         "a value is not finite",
         "a value is not finite; check the state and the load",
     ),
-    Status(
-        "memory", "no memory for more rows", "no memory for more rows; give output_step, or stream the rows to disk"
-    ),
+    Status("memory", "no memory for more rows", "no memory for more rows; give output_step"),
     Status("monitor", "a monitor stopped the run (`strict`)", "what the model leaves out would matter from here on"),
     Status(
         "separated",

@@ -155,18 +155,18 @@ def archive() -> bytes:
 
 
 def checkpoint_bytes(folder: Path) -> bytes:
-    about = {"digest": "d", "scene": "name = 'a'\n", "build": "b", "time": 1.0, "wall": 2.0, "checksum": 0}
-    checkpoint.write(folder / "good", about, b"snapshot")
+    segments = [checkpoint.Saved("b", 1.0, 2.0, b"snapshot"), checkpoint.Saved("c", 2.0, 1.0, b"another")]
+    checkpoint.write(folder / "good", checkpoint.Identity("name = 'a'\n", "d"), segments)
     return (folder / "good").read_bytes()
 
 
 def read_checkpoint(path: Path) -> None:
     """As a run reads it, which makes one line of a ValueError or an OSError."""
     try:
-        about, _ = checkpoint.read(path)
+        _, segments = checkpoint.read(path)
     except ValueError as error:
         raise InputError("checkpoint: damaged") from error
-    assert np.isfinite(about["wall"])
+    assert all(np.isfinite(each.wall) for each in segments)
 
 
 def read_folder(path: Path) -> None:

@@ -6,14 +6,12 @@
 from __future__ import annotations
 
 import random
-import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
-SEAL = 48  # bytes behind a result file: their mark and digest
 SECONDS = 20  # for one file
 
 
@@ -44,30 +42,17 @@ KINDS: list[Callable[[bytearray, random.Random], None]] = [zeros, zeros, zeros, 
 
 
 def damaged(whole: bytes, seed: int) -> bytes:
-    """The bytes of a file after some damage. Every second file has no seal, as after a change by another program.
-
-    Half of the damage is in the first twentieth of the file and about its heaps, where most of what describes it lies.
-    """
+    """The bytes of a file after some damage, half of it where most of what describes the file lies."""
     dice = random.Random(seed)
-    content = bytearray(whole[:-SEAL] if seed % 2 else whole)
-    heaps = [found.start() for found in re.finditer(b"GCOL", content)]
+    content = bytearray(whole)
     if dice.random() < 0.5:
-        begin = dice.choice([0, *heaps])
-        part = content[begin : begin + max(4096, len(content) // 20)]
+        part = content[: max(4096, len(content) // 20)]
         dice.choice(KINDS[:-1])(part, dice)
-        content[begin : begin + len(part)] = part
+        content[: len(part)] = part
     else:
         for _ in range(dice.choice([1, 1, 3])):
             dice.choice(KINDS)(content, dice) if content else None
     return bytes(content)
-
-
-def emptied_heaps(whole: bytes) -> Iterator[bytes]:
-    """The file without its seal, and with zeros over each place of its heaps: HDF5 would not end."""
-    content = whole[:-SEAL]
-    for found in re.finditer(b"GCOL", content):
-        for start in range(found.start(), found.start() + 4096, 64):
-            yield content[:start] + bytes(64) + content[start + 64 :]
 
 
 def read(path: Path) -> object:
@@ -89,9 +74,8 @@ def main(whole: Path, first: int, count: int) -> None:
 
     expected, content = read(whole), whole.read_bytes()
     path = whole.with_name(f"damaged-{whole.name}")
-    holes = list(emptied_heaps(content)) if first < 0 else []
     for seed in range(first, first + count):
-        path.write_bytes(holes[-1 - seed] if seed < 0 else damaged(content, seed))
+        path.write_bytes(damaged(content, seed))
         print(f"seed {seed}", flush=True)
         signal.alarm(SECONDS)  # ends the process, whatever it does
         try:
@@ -106,10 +90,7 @@ def main(whole: Path, first: int, count: int) -> None:
 
 
 def ends(whole: Path, first: int, count: int) -> dict[int, str]:
-    """Number of the file -> how reading it ends; what is printed beside it is an end of its own.
-
-    first: number of the first file; below zero, down to -64 for each heap, those of `emptied_heaps`.
-    """
+    """Number of the file -> how reading it ends; what is printed beside it is an end of its own."""
     found: dict[int, str] = {}
     seed, last = first, first + count
     while seed < last:

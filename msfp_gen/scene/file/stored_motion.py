@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 GROUP = "motion"  # group of the netCDF file with the polynomials
 PIECES, RECIPE = "pieces", "recipe"  # values of the attribute `motion`: polynomials in `GROUP`, or the table alone
-COMPRESSED = {"coefficients": {"zlib": True, "complevel": 1}}
+COMPRESSED = ("coefficients",)
 UNITS = "m or rad, over s^power"
 
 

@@ -56,7 +56,7 @@ def test_an_interrupted_run_is_resumed_bit_by_bit(tmp_path):
         simulate(EVENTFUL, progress=interrupt, checkpoint=file)
     assert caught.value.status == "interrupted" and 1 < len(caught.value.result.time) < 81
     assert calls[-1][1] == EVENTFUL.end
-    before = checkpoint.read(file)[0]["wall"]
+    before = checkpoint.read(file)[1][0].wall
     resumed = simulate(EVENTFUL, checkpoint=file, resume=True)
     assert same(resumed, simulate(EVENTFUL))
     assert resumed.wall_time > before > 0, "the time of both processes"

@@ -126,7 +126,7 @@ def test_messages_of_bad_bearings():
 
 
 OPTIONS = {
-    "strict": True, "stream": "run.nc", "gradients": ["motion.scale"], "energy_gradients": True,
+    "strict": True, "gradients": ["motion.scale"], "energy_gradients": True,
     "gradient_errors": False,
 }  # fmt: skip
 
