@@ -264,7 +264,7 @@ def test_an_estimate_of_a_study_is_kept_and_continued(tmp_path):
     again = estimate(table, tmp_path / "out", threads=True, workers=1)
     assert again.value == first.value and again.interval == first.interval
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("part-*")} == times
-    tighter = estimate(table, tmp_path / "out", target="15 %", threads=True, workers=1)
+    tighter = estimate(table, tmp_path / "out", target="6 %", threads=True, workers=1)
     assert tighter.runs["exact"] >= first.runs["exact"] and tighter.half < first.half
     assert len(estimate_table(tighter).rows) <= 10
     plot_estimate(tighter, tmp_path / "e.png")
