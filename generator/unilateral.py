@@ -1,14 +1,17 @@
 """Unilateral contact of a surface, for models with uplift; `seat` in names of fields refers to it.
 
 PEER 2017/07 joins the two bodies at the sphere centre by a ball joint (separation delta = 0). With uplift a stiff
-contact that transmits compression only replaces it. With the compression s = -delta, the largest penetration over the
-footprint of the slider is |s| where s points into the footprint, and s . n with the normal n at its edge otherwise. The
-force is the gradient of half the stiffness times the square of the penetration, so the contact conserves energy except
-for its damping. It transmits no force where the penetration is not positive. Source: docs/uplift.md; PEER 2017/07
-mentions uplift as a possible extension (chapter 5).
+contact that transmits compression only replaces it. With the compression s = -delta, the largest penetration d over the
+footprint of the slider is |s| where s points into the footprint, and s . n with the normal n at its edge otherwise: d is
+the length of the projection of s on the cone of the footprint. The force is the projection of s + c d ds/dt on this
+cone, times the stiffness. Without c it is the gradient of half the stiffness times d^2, and the contact conserves energy;
+with it the contact dissipates, since a projection on a convex cone is monotonic. It transmits no force where d is not
+positive. Source: docs/uplift.md; PEER 2017/07 mentions uplift as a possible extension (chapter 5).
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import sympy as sp
 
@@ -21,86 +24,93 @@ CENTRE = sp.Float("1e-60")
 """Added to a squared length [m^2]: where the length is zero, its derivative is zero, and no value changes."""
 
 
-def _compression(x: Symbols) -> Vector:
-    """Compression s = -delta [m]."""
-    return scale(sp.Integer(-1), x["d"])
-
-
-def _inside(s: Vector) -> sp.Expr:
-    """Penetration where s points into the footprint."""
-    return sp.sqrt(dot(s, s))
-
-
-def _at_edge(p: Program, par: Symbols, axis: Vector, s: Vector) -> tuple[sp.Expr, Vector, sp.Expr, sp.Expr]:
-    """Penetration at the edge of the footprint; part of s across the axis, its size, and the part along the axis."""
+def _at_edge(p: Program, par: Symbols, axis: Vector, s: Vector) -> tuple[sp.Expr, Vector, sp.Expr]:
+    """Part of s along the normal n at the edge of the footprint, n, and by how much s points out of the footprint."""
     along = p.let(dot(s, axis))
     across = p.let_vector(add(s, scale(-along, axis)), "across")
     size = p.let(sp.sqrt(dot(across, across) + CENTRE))
-    return par["ca"] * along + par["sa"] * size, across, size, along
+    normal = add(scale(par["ca"], axis), scale(p.let(par["sa"] / size), across))
+    return p.let(par["ca"] * along + par["sa"] * size), normal, p.let(par["ca"] * size - par["sa"] * along)
 
 
-def _read_inputs(p: Program, b: Blocks) -> tuple[Symbols, Symbols, Vector]:
-    """Surface parameters, kinematics of the slider and compression s [m]; declares the time derivatives."""
+@dataclass(frozen=True)
+class Compression:
+    """Compression of a contact.
+
+    Attributes:
+        s: compression [m].
+        rate: its rate relative to the slider [m/s].
+        depth: penetration, the length of the part of s in the footprint [m].
+        damped: s + c depth rate, whose part in the footprint is the force over the stiffness [m].
+    """
+
+    s: Vector
+    rate: Vector
+    depth: sp.Expr
+    damped: Vector
+
+
+def _compression(p: Program, par: Symbols, slider: Symbols, x: Symbols) -> Compression:
+    """Compression of a contact with its damping; declares the time derivatives."""
+    p.declare_rates(x["d"], x["d1"])
+    p.declare_rates(slider["t3"], p.let_vector(cross(slider["w"], slider["t3"]), "dt"))  # (2.36)
+    s = p.let_vector(scale(sp.Integer(-1), x["d"]), "s")
+    rate = p.let_vector(subtract(p.rate_vector(s), cross(slider["w"], s)), "ds")
+    edge, _, beyond = _at_edge(p, par, slider["t3"], s)
+    depth = p.let(Select(beyond, edge, p.let(sp.sqrt(dot(s, s) + CENTRE))), "depth")
+    lag = p.let(par["cs"] * depth)
+    return Compression(s, rate, depth, p.let_vector(add(s, scale(lag, rate)), "damped"))
+
+
+def unilateral_depth(b: Blocks) -> Program:
+    """Penetration, negative where the contact is open, and how far the damped compression misses the footprint."""
+    p = Program("unilateral_depth", "unilateral contact: penetration, and by how much the footprint is missed")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    slider: Symbols = p.read(b.body, "b", active=False)
+    x: Symbols = p.read(b.coordinates, "x", active=False)
+    contact = _compression(p, par, slider, x)
+    _, _, beyond = _at_edge(p, par, slider["t3"], contact.damped)
+    p.write(b.unilateral_depth, {"depth": contact.depth, "beyond": beyond}, tangents=False)
+    return p
+
+
+def _force(b: Blocks, name: str, summary: str, at_edge: bool) -> Program:
+    """Force of a closed contact with its moment and energies."""
+    p = Program(name, summary)
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     slider: Symbols = p.read(b.body, "b", active=("t3", "w"))
     x: Symbols = p.read(b.coordinates, "x", active=("d", "d1"))
-    p.declare_rates(x["d"], x["d1"])
-    p.declare_rates(slider["t3"], p.let_vector(cross(slider["w"], slider["t3"]), "dt"))  # (2.36)
-    return par, slider, p.let_vector(_compression(x), "s")
-
-
-def _write_force(p: Program, b: Blocks, par: Symbols, depth: sp.Expr, normal: Vector, s: Vector) -> Program:
-    """Force ks depth (1 + cs d depth/dt) along `normal` (Hunt and Crossley 1975) with its moment and energies."""
-    rate = p.rate(depth)
-    grip = p.let(1 + par["cs"] * rate)
-    pushing = p.let(Step(grip) * grip)  # its damping does not pull
-    elastic = p.let(par["ks"] * depth)
-    force = p.let_vector(scale(p.let(elastic * pushing), normal), "F")
+    contact = _compression(p, par, slider, x)
+    inward = contact.damped
+    if at_edge:
+        edge, normal, _ = _at_edge(p, par, slider["t3"], contact.damped)
+        inward = scale(p.let(Step(edge) * edge), normal)  # its damping does not pull
+    force = p.let_vector(scale(par["ks"], inward), "F")
+    elastic = p.let(par["ks"] * contact.depth)
     p.write(
         b.unilateral,
         {
             "F": force,
-            "T": cross(s, force),
-            "stored": elastic * depth / 2,
-            "lost": p.let(elastic * rate) * (pushing - 1),
-            "penetration": depth,
+            "T": cross(contact.s, force),
+            "stored": elastic * contact.depth / 2,
+            "lost": p.let(dot(force, contact.rate)) - elastic * p.rate(contact.depth),
+            "penetration": contact.depth,
         },
         tangents=("F", "T"),
     )
     return p
 
 
-def unilateral_depth(b: Blocks) -> Program:
-    """Penetration, negative where the contact is open, and how far the compression points out of the footprint."""
-    p = Program("unilateral_depth", "unilateral contact: penetration, and by how much the footprint is missed")
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    slider: Symbols = p.read(b.body, "b", active=False)
-    x: Symbols = p.read(b.coordinates, "x", active=False)
-    s = p.let_vector(_compression(x), "s")
-    edge, _, size, along = _at_edge(p, par, slider["t3"], s)
-    beyond = p.let(par["ca"] * size - par["sa"] * along)
-    depth = Select(beyond, p.let(edge), p.let(_inside(s)))
-    p.write(b.unilateral_depth, {"depth": depth, "beyond": beyond}, tangents=False)
-    return p
-
-
 def unilateral_inside(b: Blocks) -> Program:
-    """Contact whose resultant passes through the footprint: a spring that is equally stiff in every direction."""
-    p = Program("unilateral_inside", "unilateral contact: force while the resultant passes through the footprint")
-    par, _, s = _read_inputs(p, b)
-    depth = p.let(_inside(s), "depth")
-    return _write_force(p, b, par, depth, p.let_vector(scale(1 / depth, s), "n"), s)
+    """Contact whose resultant passes through the footprint: spring and damper are equal in every direction."""
+    summary = "unilateral contact: force while the resultant passes through the footprint"
+    return _force(b, "unilateral_inside", summary, at_edge=False)
 
 
 def unilateral_edge(b: Blocks) -> Program:
     """Contact at the edge of the footprint: the slider stands on its edge, and the force produces a righting moment."""
-    p = Program("unilateral_edge", "unilateral contact: force while the slider stands on the edge of its footprint")
-    par, slider, s = _read_inputs(p, b)
-    axis = slider["t3"]
-    edge, across, size, _ = _at_edge(p, par, axis, s)
-    depth = p.let(edge, "depth")
-    normal = p.let_vector(add(scale(par["ca"], axis), scale(p.let(par["sa"] / size), across)), "n")
-    return _write_force(p, b, par, depth, normal, s)
+    summary = "unilateral contact: force while the slider stands on the edge of its footprint"
+    return _force(b, "unilateral_edge", summary, at_edge=True)
 
 
 def rim_to_world(b: Blocks) -> Program:
