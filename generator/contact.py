@@ -36,11 +36,13 @@ class FrictionModel:
         bouc_wen: name of the hysteresis law.
         drilling: what resists spin by a moment; None: nothing does.
         coefficient: friction law; None for a constant friction coefficient.
+        seated: whether a unilateral contact carries the surface (uplift).
     """
 
     bouc_wen: str
     drilling: Spin | None
     coefficient: friction_laws.Law | None = None
+    seated: bool = False
 
 
 Basis = tuple[Vector, Vector, Vector]
@@ -55,14 +57,15 @@ def contact_basis(p: Program, sin_psi: sp.Expr, cos_psi: sp.Expr, sin_theta: sp.
 
 
 def slip(
-    p: Program, friction_model: FrictionModel, par: Symbols, base: Basis, shear: Shear, dw: Vector
+    p: Program, friction_model: FrictionModel, par: Symbols, base: Basis, shear: Shear, N: sp.Expr, dw: Vector
 ) -> tuple[sp.Expr, Symbols]:
     """Signed radius sign R, and slip velocity u, v (2.98), (3.19) with the rates of the friction state (3.18)."""
     t1, t2, _ = base
     signed_radius = p.let(par["sign"] * par["R"])
     # (3.19): v~ = -sign R dw x t~_3; its components (2.98) by the triple product.
     u, v = p.let(-signed_radius * dot(dw, t2), "u"), p.let(signed_radius * dot(dw, t1), "v")
-    return signed_radius, {**friction_rates(p, friction_model.bouc_wen, shear, u, v, par["dy"]), "u": u, "v": v}
+    dy = laws.yield_displacement(p, friction_model.seated, par, N)
+    return signed_radius, {**friction_rates(p, friction_model.bouc_wen, shear, u, v, dy), "u": u, "v": v}
 
 
 def friction(
@@ -101,7 +104,7 @@ def report_contact(b: Blocks, friction_model: FrictionModel) -> Program:
     loc: Symbols = p.read(b.relative, "loc", active=("dw",))
     base = contact_basis(p, *(p.let(function(x[a])) for a in ("psi", "theta") for function in (sp.sin, sp.cos)))
     shear = Shear(f["Y"], f["Z"], (f["Y"], f["Z"]), par["td"], sp.Integer(1))
-    signed_radius, rates = slip(p, friction_model, par, base, shear, loc["dw"])
+    signed_radius, rates = slip(p, friction_model, par, base, shear, x["N"], loc["dw"])
     par, heat = laws.evaluate_law(p, b, friction_model.coefficient, par, loc, x["N"], rates)
     g = {name: p.let(f[name] + par["td"] * rates[f"d{name}"]) for name in ("Y", "Z")}
     out = {**rates, **friction(p, friction_model, par, base, x["N"], g, loc["dw"], signed_radius)}
@@ -151,7 +154,7 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
     unknown = laws.read_unknown_coefficient(p, b, friction_model.coefficient, par)
     N, (sp_, cp_, st_, ct_) = closed_form(p, unknown, loc["p"], g)
     base = contact_basis(p, sp_, cp_, st_, ct_)
-    signed_radius, rates = slip(p, friction_model, par, base, shear, loc["dw"])
+    signed_radius, rates = slip(p, friction_model, par, base, shear, N, loc["dw"])
     out = {**rates, **friction(p, friction_model, unknown, base, N, g, loc["dw"], signed_radius)}
     law = friction_model.coefficient
     out |= laws.law_results(p, law, par, unknown, stage, loc, N, shear.df_dg, rates)

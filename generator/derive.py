@@ -57,7 +57,7 @@ def derive(spec: ModelSpec) -> Equations:
     surface = laws.with_fields(blocks.surface_parameters, parameters.number_fields(effects))
     blocks = laws.add_law_fields(replace(blocks, surface_parameters=surface), effects.law)
     values = parameters.value_blocks(effects)
-    friction_model = contact.FrictionModel(effects.bouc_wen, effects.drilling, effects.law)
+    friction_model = contact.FrictionModel(effects.bouc_wen, effects.drilling, effects.law, effects.uplift)
     massless = effects.sliders == "massless"
     programs = [
         *parameters.programs(blocks, values, effects),

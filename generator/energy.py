@@ -9,10 +9,11 @@ import sympy as sp
 
 from .blocks import Blocks
 from .functions import Step
+from .laws import yield_displacement
 from .program import Program, Symbols, cross, dot, subtract
 
 
-def friction_power(b: Blocks) -> Program:
+def friction_power(b: Blocks, uplift: bool) -> Program:
     """Powers of friction at one surface.
 
     Friction stores mu N d_y |f|^2/2; a sheared contact with the damping time T dissipates mu N d_y T |df/dt|^2; plastic
@@ -22,7 +23,7 @@ def friction_power(b: Blocks) -> Program:
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     c: Symbols = p.read(b.contact, "c", active=False)
     limit = p.let((c if "mu" in c else par)["mu"] * c["N"], "limit")  # a friction law gives mu with the contact
-    depth, T = p.let(limit * par["dy"], "depth"), par["td"]
+    depth, T = p.let(limit * yield_displacement(p, uplift, par, c["N"]), "depth"), par["td"]
     stored, damped, all_work = sp.Integer(0), sp.Integer(0), sp.Integer(0)
     for f, rate, slip in ((c["Y"], c["dY"], c["u"]), (c["Z"], c["dZ"], c["v"])):
         stored += p.let(depth * f * rate)
@@ -183,7 +184,7 @@ def works(b: Blocks, rims: bool, uplift: bool) -> Program:
 def programs(b: Blocks, rims: bool, uplift: bool, rotating_support: bool) -> list[Program]:
     """All programs of the energy balance but the energies of masses."""
     return [
-        friction_power(b),
+        friction_power(b, uplift),
         *([closed_rim(b), rim_energy(b)] if rims else []),
         *([unilateral_energy(b)] if uplift else []),
         works(b, rims, uplift),

@@ -56,6 +56,18 @@ def friction_rates(p: Program, law: str, shear: Shear, u: sp.Expr, v: sp.Expr, d
     return (plastic_rates if is_plastic(law) else partial(bouc_wen_rates, law))(p, shear, u, v, dy)
 
 
+def yield_displacement(p: Program, seated: bool, par: Symbols, N: sp.Expr) -> sp.Expr:
+    """d_y of a surface at the normal force N; with uplift less mu N/k, by which its unilateral contact yields.
+
+    The given d_y is that of surface and contact in series. At least half of it is left to friction.
+    """
+    if not seated:
+        dy: sp.Expr = par["dy"]
+        return dy
+    half, seat = p.let(par["dy"] / 2), p.let(par["mu"] * N / par["ks"])
+    return p.let(par["dy"] - p.let(Select(half - seat, seat, half)), "dy")
+
+
 def bouc_wen_rates(law: str, p: Program, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:
     """dY/dt and dZ/dt (3.18) with 1/d_y for R/R_0, and the switches of the hysteresis law.
 

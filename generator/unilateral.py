@@ -2,11 +2,11 @@
 
 PEER 2017/07 joins the two bodies at the sphere centre by a ball joint (separation delta = 0). With uplift a stiff
 contact that transmits compression only replaces it. With the compression s = -delta, the largest penetration d over the
-footprint of the slider is |s| where s points into the footprint, and s . n with the normal n at its edge otherwise: d is
-the length of the projection of s on the cone of the footprint. The force is the projection of s + c d ds/dt on this
-cone, times the stiffness. Without c it is the gradient of half the stiffness times d^2, and the contact conserves energy;
-with it the contact dissipates, since a projection on a convex cone is monotonic. It transmits no force where d is not
-positive. Source: docs/uplift.md; PEER 2017/07 mentions uplift as a possible extension (chapter 5).
+footprint of the slider is |s| where s points into the footprint, and s . n with the normal n at its edge otherwise: it
+is the length of the projection of s on the cone of the footprint. The force is the projection of s + c d ds/dt on this
+cone, times the stiffness. Without c it is the gradient of half the stiffness times d^2, and the contact conserves
+energy; with it the contact dissipates, since projections on convex cones are monotonic. It transmits no force where d
+is not positive. Source: docs/uplift.md; PEER 2017/07 mentions uplift as a possible extension (chapter 5).
 """
 
 from __future__ import annotations

@@ -327,18 +327,18 @@ def separations_at_rest(bearing: Bearing, top: Top | None, added_load: float = 0
     mass = top.mass if isinstance(top, MassTop) else 0.0
     masses = np.array([body.mass for body in bearing.bodies])
     masses[-1] += mass
-    out = np.zeros((len(masses), 3))
-    out[:, 2] = -settlements(load, bearing.gravity, masses, seat_stiffness(bearing, top))
-    return out
+    return separations_under(np.array([0.0, 0.0, -load]), bearing.gravity, masses, seat_stiffness(bearing, top))
 
 
-def settlements(load: complex, gravity: complex, masses: ArrayLike, stiffness: ArrayLike) -> Any:
-    """Compression of the contacts of all surfaces at rest, ndarray, shape (n-1,) [m].
+def separations_under(force: Array, gravity: float, masses: Array, stiffness: Array) -> Array:
+    """Separations at which the contacts of all surfaces carry the weights and a force, ndarray, shape (n-1, 3) [m].
 
-    load: on the top plate, downward positive [N]. masses: of bodies 2..n with what they carry, shape (n-1,) [kg].
-    stiffness: of the contacts, shape (n-1,) [N/m]. Complex where it is differentiated.
+    force: on the top plate, shape (3,) [N]. masses: of bodies 2..n with what they carry, shape (n-1,) [kg]. stiffness:
+    of the contacts, shape (n-1,) [N/m].
     """
-    return (load + gravity * np.cumsum(np.asarray(masses)[::-1])[::-1]) / np.asarray(stiffness)
+    out = np.tile(np.asarray(force, dtype=float), (len(masses), 1))
+    out[:, 2] -= gravity * np.cumsum(masses[::-1])[::-1]
+    return out / stiffness[:, None]
 
 
 FAILURES = {status.name: status.evaluation for status in STATUSES if status.evaluation is not None}

@@ -14,7 +14,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
-from msfp_gen.model.compiled import Run, bodies_and_surfaces, settlements, top_values
+from msfp_gen.model.compiled import Run
 from msfp_gen.model.model import Model
 from msfp_gen.model.plane import motion_in_plane, out_of_plane, wrench_in_plane
 from msfp_gen.motions.motion import Motion
@@ -28,14 +28,17 @@ from msfp_gen.scene.friction_parameters import derived_slopes, law_parameters
 from msfp_gen.scene.parameters import Parameter, parameters_of
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.standing import SPRINGS, stiffness_slopes
-from msfp_gen.scene.top import is_sprung, load_values
+from msfp_gen.scene.top import is_sprung
+from msfp_gen.simulation import seats
 from msfp_gen.simulation.rows import Segment, unpacked
 from msfp_gen.simulation.start import (
     Frame,
-    first_load,
+    given_state,
     needs_settling,
+    seats_at_start,
     state_in_plane,
     time_grid,
+    values_at_start,
     wrench_pieces,
 )
 from msfp_gen.specification import contract
@@ -205,19 +208,19 @@ class _Inputs:
             self.arrays |= dict(zip(_STATE, values, strict=True))
 
     def _separations(self) -> None:
-        """The separations at rest, with which a run starts, by a complex step."""
-        bearing, top, step = self.scene.bearing, self.scene.top, 1e-100
-        bodies, surfaces = bodies_and_surfaces(bearing, self.model.effects, top)
-        mass, on_top, arrays = self.bodies.index("mass"), self.top.index("mass"), self.arrays
-        masses = bodies[1:, mass] + 1j * step * arrays["bodies"][1:, mass]
-        masses[-1] += top_values(top)[on_top] + 1j * step * arrays["top"][on_top]
-        load = first_load(self.scene) - load_values(top)[2]
-        load -= 0.0 if arrays["load"] is None else 1j * step * arrays["load"][0, 2, 0]
-        stiffness = surfaces[:, self.seat] + 1j * step * arrays["surfaces"][:, self.seat]
-        heights = np.zeros_like(arrays["q"])
-        gravity = bearing.gravity + 1j * step * arrays["gravity"]
-        heights[:, 2] = -settlements(load, gravity, masses, stiffness).imag / step
-        arrays["q"], arrays["v"] = np.hstack([arrays["q"], heights]), np.hstack([arrays["v"], np.zeros_like(heights)])
+        """The separations with which a run starts."""
+        arrays = self.arrays
+        start = seats_at_start(self.scene, self.model, self.frame, given_state(self.scene, self.model, self.frame))
+        motion, load = arrays["motion"], arrays["load"]
+        direction = seats.Start(
+            **{name: arrays[name] for name in ("gravity", "bodies", "surfaces", "top", "q", "v")},
+            f=arrays["h"],
+            base=np.zeros((3, 6)) if motion is None else values_at_start(motion),
+            load=np.zeros(6) if load is None else load[0, :, 0],
+            support=np.zeros(12),
+        )
+        apart = seats.slopes(self.model, start, direction)
+        arrays["q"], arrays["v"] = np.hstack([arrays["q"], apart]), np.hstack([arrays["v"], np.zeros_like(apart)])
 
     def _leaves_plane(self) -> InputError:
         return InputError(

@@ -15,7 +15,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
-from msfp_gen.model.compiled import Port, Run, separations_at_rest
+from msfp_gen.model.compiled import Port, Run, bodies_and_surfaces, separations_at_rest, top_values
 from msfp_gen.model.model import Model
 from msfp_gen.model.plane import (
     motion_in_plane,
@@ -27,7 +27,7 @@ from msfp_gen.model.plane import (
     wrench_in_plane,
 )
 from msfp_gen.motions.motion import Motion
-from msfp_gen.motions.piecewise import ORDER
+from msfp_gen.motions.piecewise import ORDER, derivatives
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.motions.time_grid import TimeGrid, snapped
 from msfp_gen.results.geometry import rim_forces
@@ -43,6 +43,7 @@ from msfp_gen.scene.scene_fields import InitialState
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import seat_stiffness
 from msfp_gen.scene.top import Top, load_values, sprung_mass
+from msfp_gen.simulation import seats
 from msfp_gen.specification.friction_laws import SPIN, Law
 from msfp_gen.specification.layout import Auto, ModelSpec
 
@@ -184,7 +185,7 @@ def start_run(
     load_knots, wrench = wrench_pieces(scene)
     frame = Frame.of(scene, model, wrench)
     if at is None:
-        q, v, f = _initial_state(scene, model, frame.azimuth)
+        q, v, f = _initial_state(scene, model, frame)
     else:
         q, v, f = transferred_state(scene.bearing, scene.top, model, at)
     stack = model.stack(scene.bearing, scene.top, anchor=frame.motion.displacement(0.0)[:2])
@@ -271,18 +272,45 @@ def time_grid(scene: Scene) -> TimeGrid:
     return TimeGrid.of_histories(histories, scene.end, (scene.solver.max_step, scene.motion.max_step))
 
 
-def _initial_state(scene: Scene, model: Model, azimuth: float) -> tuple[Array, Array, Array]:
+def _initial_state(scene: Scene, model: Model, frame: Frame) -> tuple[Array, Array, Array]:
     """The initial state q, v, f of a scene in the frame of a model."""
+    q, v, f = given_state(scene, model, frame)
+    if model.effects.uplift:
+        q = np.hstack([q, seats.separations(model, seats_at_start(scene, model, frame, (q, v, f)))])
+        v = np.hstack([v, np.zeros_like(v)])
+    return q, v, f
+
+
+def seats_at_start(scene: Scene, model: Model, frame: Frame, state: tuple[Array, Array, Array]) -> seats.Start:
+    """What the separations at the start depend on; state: q, v, f in the frame of the model."""
+    support = np.zeros((2, 6))
+    if frame.rotation is not None:
+        support[:, :2] = values_at_start(_support_rotation(scene, frame.rotation)[1])[:2, :2]
+    return seats.Start(
+        scene.bearing.gravity,
+        *bodies_and_surfaces(scene.bearing, model.effects, scene.top),
+        top_values(scene.top, anchor=frame.motion.displacement(0.0)[:2]),
+        *state,
+        base=values_at_start(frame.motion.coefficients),
+        load=frame.wrench[0, :, 0].copy(),
+        support=support.ravel(),
+    )
+
+
+def values_at_start(coefficients: Array) -> Array:
+    """Values and two derivatives at time zero of the first of some polynomials, shape (3, channels)."""
+    return np.ascontiguousarray(derivatives(0.0) @ coefficients[0].T)
+
+
+def given_state(scene: Scene, model: Model, frame: Frame) -> tuple[Array, Array, Array]:
+    """The initial state of a scene in the frame of a model, without separations."""
     count, state = scene.bearing.layout.surfaces, scene.initial_state
     q, v, f = (
         np.zeros((count, k)) if state is None else np.array(value, dtype=float)
         for k, value in zip((3, 3, 2), (None,) * 3 if state is None else (state.q, state.v, state.h), strict=True)
     )
     if model.planar:
-        q, v, f = state_in_plane(q, v, f, azimuth)
-    if model.effects.uplift:
-        q = np.hstack([q, separations_at_rest(scene.bearing, scene.top, first_load(scene))])
-        v = np.hstack([v, np.zeros((count, 3))])
+        q, v, f = state_in_plane(q, v, f, frame.azimuth)
     return q, v, f
 
 

@@ -10,6 +10,7 @@ from msfp_gen import (
     Auto,
     Effects,
     InputError,
+    Load,
     Motion,
     RunError,
     Scene,
@@ -22,6 +23,7 @@ from msfp_gen import (
 )
 from msfp_gen.model.compiled import bodies_and_surfaces, top_values
 from msfp_gen.results.geometry import contact_offsets
+from msfp_gen.scene.scene_fields import InitialState
 
 
 def swayed(effects):
@@ -174,3 +176,105 @@ def test_contacts_softer_than_the_top_are_refused():
     model = build_model(soft.layout, scene.effects)
     with pytest.raises(ValueError, match=r"surfaces: seat_stiffness: .*in series must be stiffer than the top"):
         model.extension.Stack(soft.gravity, *values, top_values(scene.top))
+
+
+def oblique(tilt, azimuth, effects):
+    """A load along the axis of a tilted stack."""
+    bearing = presets.bearing("double-fp")
+    axis = np.array([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)])
+    position = np.zeros((1, 6, 6))
+    position[0, 3:5, 0] = np.arctan2(-axis[1], axis[2]), np.arcsin(axis[0])
+    state = InitialState(np.zeros((2, 3)).tolist(), np.zeros((2, 3)).tolist(), np.zeros((2, 2)).tolist())
+    load, top = Load.constant(tuple(-112e3 * axis)), Top.prescribed((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    motion = Motion(np.array([0.0, 0.01]), position)
+    return Scene(bearing, motion, top, effects, load=load, initial_state=state)
+
+
+@pytest.mark.parametrize("tilt", [0.2, 0.9])
+@pytest.mark.parametrize(("dimension", "azimuth"), [("planar", 0.0), ("spatial", 0.6)])
+def test_an_oblique_load_starts_with_one_normal_force(tilt, dimension, azimuth):
+    starts = [
+        simulate(oblique(tilt, azimuth, Effects(dimension=dimension, uplift=uplift))).history.normal_force[0]
+        for uplift in (False, True)
+    ]
+    assert starts[1] == pytest.approx(starts[0], rel=1e-9)
+
+
+def test_a_mass_pushed_aside_starts_with_one_normal_force():
+    """Tilted and moving sliders below a mass on a spring, which a force pushes aside: not a state of rest."""
+    top = Top.mass(11e3, 300.0, 0.5, 1e7, 1e4, 1e8, 1e5)
+    q, v = [[0.0, 0.06, 0.0], [0.0, -0.06, 0.0]], [[0.0, 0.1, 0.0], [0.0, 0.0, 0.0]]
+    state = InitialState(q, v, [[0.0, 0.0], [0.0, 0.0]])
+    motion, load = Motion(np.array([0.0, 0.01]), np.zeros((1, 6, 6))), Load.constant((-22e3, 0.0, -1e5))
+    scene = Scene(presets.bearing("double-fp"), motion, top, PLANAR, load=load, initial_state=state)
+    starts = [
+        simulate(replace(scene, effects=replace(PLANAR, uplift=uplift))).history.normal_force[0]
+        for uplift in (False, True)
+    ]
+    assert starts[1] == pytest.approx(starts[0], rel=1e-5)
+
+
+def stuck(effects):
+    """A mass that friction holds on its bearing, after a jolt."""
+    top = Top.mass(2.2e5, 6.6e4, 0.4, 2.2e7, 1.1e5, 6.2e8, 1.2e6)
+    bearing = presets.bearing("double-fp").replace(yield_displacement=2e-4, friction=0.07, contact_damping=1e-4)
+    motion = Motion.harmonic(0.145, 0.15, cycles=0.5)
+    return Scene(bearing, motion, top, effects, Solver(rtol=1e-6), output_step=1e-3)
+
+
+def test_a_stuck_mass_has_one_stiffness():
+    """The yield displacement contains the contact: without this the frequencies differ, and forces by 15 %."""
+    runs = [simulate(stuck(replace(PLANAR, uplift=uplift, bouc_wen="plastic"))).history for uplift in (False, True)]
+    assert 0.1 < np.abs(runs[0].friction_state).max() < 0.9
+    forces = [run.top_force[:, 0] for run in runs]
+    assert np.abs(forces[1] - forces[0]).max() < 0.02 * np.abs(forces[0]).max()
+
+
+def growth(scene, time):
+    """Largest growth rate [1/s] of vibrations beyond 100 Hz about the state at `time` of a sliding stack."""
+    history = simulate(replace(scene, duration=time)).history
+    model = build_model(scene.bearing.layout, scene.effects)
+    stack = model.stack(scene.bearing, scene.top)
+    angles, rates = (x[-1] for x in (history.tilt_angles, history.tilt_rates))
+    base = np.zeros((3, 6))
+    for order in range(3):
+        base[order] = scene.motion.evaluate(time, order)
+    columns = [0, 1, 3, 4, 5]
+    count = 5 * len(angles)
+
+    def slopes(y):
+        q, v = np.zeros((len(angles), 6)), np.zeros((len(angles), 6))
+        q[:, columns], v[:, columns] = y[:count].reshape(-1, 5), y[count : 2 * count].reshape(-1, 5)
+        f = np.ascontiguousarray(y[2 * count :].reshape(-1, 2))
+        status, a, _, df, *_ = stack.accelerations(q, v, f, base, np.zeros(6))
+        assert status == "ok"
+        return np.concatenate([v[:, columns].ravel(), a[:, columns].ravel(), df.ravel()])
+
+    q = np.hstack([angles, history.separation[-1]])[:, columns]
+    v = np.hstack([rates, np.zeros_like(history.separation[-1])])[:, columns]
+    y = np.concatenate([q.ravel(), v.ravel(), history.friction_state[-1].ravel()])
+    steps = np.where(np.arange(len(y)) < count, np.where(np.arange(len(y)) % 5 < 2, 1e-7, 1e-10), 1e-6)
+    jacobian = [(slopes(y + s * e) - slopes(y - s * e)) / (2 * s) for s, e in zip(steps, np.eye(len(y)), strict=True)]
+    modes = np.linalg.eigvals(np.transpose(jacobian))
+    vibrations = modes[np.abs(modes.imag) > 200 * np.pi]
+    assert len(vibrations)
+    return vibrations.real.max()
+
+
+def test_sliders_do_not_vibrate_in_their_seats():
+    """With seats that are damped along the compression alone a vibration at 2.6 kHz grows at 18 1/s."""
+    bearing = presets.bearing("single-articulated-fp").replace(
+        radius=[2.437, 0.1772],
+        friction=[0.0693, 0.0579],
+        yield_displacement=1.26e-4,
+        contact_damping=1e-4,
+        mass=[82.0, 181.0],
+        inertia=[(0.605, 0.725), (5.07, 9.98)],
+        height=[0.188, 0.0665],
+        centroid=[0.094, 0.0332],
+        rim_radius=[0.133, 0.0],
+    )
+    top = Top.mass(4.797e4, 1.44e4, 0.4, 4.7e6, 2.35e4, 5.1e8, 4.95e5)
+    motion = Motion.figure_eight(0.1038, 1.485, cycles=1.0, lead_in=3.0)
+    scene = Scene(bearing, motion, top, Effects(uplift=True, bouc_wen="plastic"), Solver(rtol=1e-5))
+    assert max(growth(scene, time) for time in (2.8, 4.1)) < -1.0
