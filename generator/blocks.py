@@ -357,11 +357,11 @@ def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
         "gap": new("gap").scalar("s", "m", "sliding displacement (3.20)").scalar("g", "m", "gap (3.21)").build(),
         "unilateral_depth": new("unilateral_depth")
         .scalar("depth", "m", "penetration; negative where the contact is open")
-        .scalar("beyond", "m", "how far the compression points out of the footprint; positive: edge contact")
+        .scalar("beyond", "m", "how far s + c depth ds/dt points out of the footprint; positive: edge contact")
         .build(),
         "unilateral": new("unilateral")
         .vector("F", "N", "force on the body above, along E1, E2, E3", POLAR)
-        .vector("T", "N m", "moment on the slider about its sphere centre, while it stands on its edge", AXIAL)
+        .vector("T", "N m", "moment on the slider about its sphere centre, of F through the other centre", AXIAL)
         .scalar("stored", "J", "elastic energy")
         .scalar("lost", "W", "power dissipated; where the contact lets go, what its spring releases")
         .scalar("penetration", "m", "of the slider, positive")

@@ -79,8 +79,10 @@ def slopes(model: Model, start: Start, direction: Start) -> Array:
     step = start.step(direction)
 
     def difference(separations: Callable[[Start], Array | None]) -> Array | None:
-        before, after = (separations(start.moved(direction, sign * step)) for sign in (-1.0, 1.0))
-        return None if before is None or after is None else (after - before) / (2.0 * step)
+        at, near, far = (
+            separations(start.moved(direction, count * step)) for count in range(3)
+        )  # some are not below 0
+        return None if at is None or near is None or far is None else (4.0 * near - 3.0 * at - far) / (2.0 * step)
 
     found = difference(lambda at: _held_together(model, at))
     resting = difference(_at_rest)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import seats
 from support.flights import shaken
 
 from msfp_gen import (
@@ -23,6 +24,7 @@ from msfp_gen import (
 )
 from msfp_gen.model.compiled import bodies_and_surfaces, top_values
 from msfp_gen.results.geometry import contact_offsets
+from msfp_gen.scene.parameters import changed_parameters
 from msfp_gen.scene.scene_fields import InitialState
 
 
@@ -278,3 +280,29 @@ def test_sliders_do_not_vibrate_in_their_seats():
     motion = Motion.figure_eight(0.1038, 1.485, cycles=1.0, lead_in=3.0)
     scene = Scene(bearing, motion, top, Effects(uplift=True, bouc_wen="plastic"), Solver(rtol=1e-5))
     assert max(growth(scene, time) for time in (2.8, 4.1)) < -1.0
+
+
+def test_the_start_under_an_oblique_load_is_differentiated():
+    """Derivatives of the separations at the start, against the starts of other scenes."""
+    scene = replace(oblique(0.2, 0.6, Effects(uplift=True)), output_step=None)
+    paths = ["bearing.surfaces[0].friction", "bearing.bodies[1].mass", "load.scale", "initial_state.v[0][1]"]
+    run = simulate(scene, gradients=paths, gradient_errors=False)
+    for parameter, slope in zip(run.gradients.parameters, run.gradients.arrays["separation"][:, 0], strict=True):
+        step = 1e-4 * (abs(parameter.value) or 1.0)
+        ends = [
+            simulate(changed_parameters(scene, {parameter: parameter.value + side * step})).history.separation[0]
+            for side in (-1, 1)
+        ]
+        expected = (ends[1] - ends[0]) / (2 * step)
+        assert slope == pytest.approx(expected, rel=1e-4, abs=1e-5 * np.abs(expected).max() + 1e-16)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(seats.SCENES))
+def test_a_closed_bearing_has_one_peak_force(number):
+    """Random pendulums below sprung masses: with uplift at tight tolerances as without it."""
+    scene = seats.scene(number)
+    plain, *forces = (
+        seats.peak(scene, *run)[0] for run in ((False, 1e-7), *((True, rtol) for rtol in seats.TOLERANCES))
+    )
+    assert np.ptp([plain, *forces]) < 2e-3 * plain
