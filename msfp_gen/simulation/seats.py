@@ -70,7 +70,7 @@ def separations(model: Model, start: Start) -> Array:
     Where bodies would have to pull, or a slider tips, no contact holds them together: these are the separations under
     weights and loads.
     """
-    found, rest = _held_together(model, start), _at_rest(start)
+    found, rest = _held_together(model, start), _at_rest(model, start)
     return rest if found is None or np.abs(found - rest).max() < RESTING * np.abs(rest).max() else found
 
 
@@ -85,22 +85,17 @@ def slopes(model: Model, start: Start, direction: Start) -> Array:
         return None if at is None or near is None or far is None else (4.0 * near - 3.0 * at - far) / (2.0 * step)
 
     found = difference(lambda at: _held_together(model, at))
-    resting = difference(_at_rest)
+    resting = difference(lambda at: _at_rest(model, at))
     assert resting is not None
     return resting if found is None else found
 
 
-def _at_rest(start: Start) -> Array:
+def _at_rest(model: Model, start: Start) -> Array:
     """Separations under the weights above every surface and the force on the top plate."""
     masses = np.array(start.bodies[1:, contract.names(contract.BODY).index("mass")])
     masses[-1] += start.top[contract.names(contract.TOP).index("mass")]
-    stiffness = start.surfaces[:, _surface_value("seat_stiffness")]
+    stiffness = start.surfaces[:, contract.surface_values(model.effects).index("seat_stiffness")]
     return separations_under(start.load[:3], start.gravity, masses, stiffness)
-
-
-def _surface_value(name: str) -> int:
-    """Column of a value of a surface."""
-    return contract.names((*contract.SURFACE, *contract.SURFACE_UPLIFT)).index(name)
 
 
 def _held_together(model: Model, start: Start) -> Array | None:
@@ -109,7 +104,7 @@ def _held_together(model: Model, start: Start) -> Array | None:
     Newton's method on separations and angular accelerations.
     """
     stack = model.extension.Stack(start.gravity, start.bodies, start.surfaces, start.top)
-    d = _at_rest(start)
+    d = _at_rest(model, start)
     count, apart = len(d), [0, 2] if model.planar else [0, 1, 2]
     v, a = np.hstack([start.v, np.zeros((count, 3))]), np.zeros((count, 6))
     load = np.concatenate([start.load, start.support])
@@ -134,5 +129,5 @@ def _held_together(model: Model, start: Start) -> Array | None:
         a[:, [1] if model.planar else range(angles)] += change[:, :angles]
         d[:, apart] += change[:, angles:]
         if np.abs(change[:, angles:]).max() <= ACCURACY * np.abs(d).max():
-            return d if np.abs(d).max() < LARGEST * np.abs(_at_rest(start)).max() else None
+            return d if np.abs(d).max() < LARGEST * np.abs(_at_rest(model, start)).max() else None
     return None
