@@ -63,8 +63,7 @@ def write_alone(spec: ModelSpec, folder: Path) -> BuildInfo:
             operations=generated.operations,
             stages={**generated.stages, "compile": perf_counter() - compiling},
         )
-        manifest.write(part)
-        copy_module(part, manifest, target, replaceable)
+        copy_module({name: part / name for name in manifest.files}, manifest, target, replaceable)
     return BuildInfo(
         path=target / manifest.extension,
         folder=target,

@@ -288,6 +288,7 @@ def _remove(prefix: Path, name: str) -> None:
 
 
 README = "README.md"
+WRAPPER = ("msfp_module.pyx", ENTRY, "msfp.h")  # of the generated folder, which have a row of their own
 STAMP = "written by msfp-gen"  # in the first line: a file without it belongs to the user
 
 
@@ -316,8 +317,10 @@ def _guide_content(spec: ModelSpec, folder: Path, module: str) -> dict[str, Any]
         "spec": spec,
         "effects": effects_text(spec),
         "module": module,
-        "sources": sorted(path.name for path in folder.glob("*.c") if path.name != ENTRY),
-        "private": sorted({path.name for path in folder.glob("*.h")} - {"msfp.h", f"{module}.h"}),
+        "derived": sorted({path.name for path in (folder / "derived").glob("*")} - {f"{module}.h"}),
+        "runtime": sorted(path.name for path in (folder / "runtime").glob("*") if path.name not in WRAPPER),
+        "example": values.example(spec),
+        "planar": spec.effects.dimension == "planar",
         "body": contract.BODY,
         "surface": surface_values(spec),
         "top": contract.TOP,

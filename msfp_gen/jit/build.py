@@ -31,6 +31,7 @@ from functools import cache as remember
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
 from types import ModuleType
 from typing import Any
@@ -112,7 +113,10 @@ def load(spec: ModelSpec, progress: Progress | None = None) -> tuple[ModuleType,
 def generate_to(spec: ModelSpec, folder: Path | str, progress: Progress | None = None) -> BuildInfo:
     """Write the sources and the compiled module of a model into `folder`, for a plain `import msfp_5_2_2`.
 
-    The module runs on every processor of this architecture. Each file is replaced in one rename, the manifest first and
+    The module runs on every processor of this architecture. Its sources are in two folders, `derived` and `runtime`:
+    what was derived for this layout, and what is the same for every model.
+
+    Each file is replaced in one rename, the manifest first and
     the extension last. Files that msfp-gen did not write are never changed.
 
     Raises
@@ -126,21 +130,36 @@ def generate_to(spec: ModelSpec, folder: Path | str, progress: Progress | None =
     replaceable = replaceable_files(target, cache.module_name(spec))
     info = prepare(spec, progress, portable=True)
     manifest = cache.Manifest.read(info.folder)
-    copy_module(info.folder, manifest, target, replaceable)
+    moved = replace(manifest, files={place_of(name): digest for name, digest in manifest.files.items()})
+    copy_module({place_of(name): info.folder / name for name in manifest.files}, moved, target, replaceable)
     return replace(info, path=target / manifest.extension, folder=target)
 
 
-def copy_module(source: Path, manifest: cache.Manifest, target: Path, replaceable: set[str]) -> None:
-    """Copy what a manifest lists into `target`; see `generate_to`. replaceable: files there that may be replaced."""
-    files = [cache.MANIFEST_NAME, *sorted(set(manifest.files) - {manifest.extension}), manifest.extension]
-    if foreign := [name for name in files if name not in replaceable and (target / name).exists()]:
+def place_of(name: str) -> str:
+    """Path in a folder of the user of a file of a model: derived code and what all models share lie apart."""
+    if not name.endswith(SUFFIXES):
+        return name
+    shared = name in runtime_sources(gradients=True) or name in (ENTRY, "msfp.h") or name.endswith(".pyx")
+    return f"{'runtime' if shared else 'derived'}/{name}"
+
+
+def copy_module(files: Mapping[str, Path], manifest: cache.Manifest, target: Path, replaceable: set[str]) -> None:
+    """Copy the files of a module into `target`, the manifest first and the extension last; see `generate_to`.
+
+    files: path in `target` -> source. replaceable: files there that may be replaced.
+    """
+    names = [*sorted(set(files) - {manifest.extension}), manifest.extension]
+    if foreign := [name for name in names if name not in replaceable and (target / name).exists()]:
         raise InputError(
             f"output folder {target}: msfp-gen did not write {foreign[0]}: move it away or name another folder"
         )
-    with cache.write_errors(target, "output folder"):
+    with cache.write_errors(target, "output folder"), TemporaryDirectory() as part:
         target.mkdir(parents=True, exist_ok=True)
-        for name in files:
-            _replace(source / name, target / name)
+        manifest.write(Path(part))
+        _replace(Path(part) / cache.MANIFEST_NAME, target / cache.MANIFEST_NAME)
+        for name in names:
+            (target / name).parent.mkdir(exist_ok=True)
+            _replace(files[name], target / name)
 
 
 def load_extension(path: Path, module: str) -> ModuleType:

@@ -305,15 +305,17 @@ def test_generate_to_gives_a_module_for_a_plain_import(models: Path, tmp_path: P
     target = tmp_path / "out" / "dfp"
     info = build.generate_to(SPEC, target)
     assert info.path == target / f"{MODULE}{compiler.EXTENSION_SUFFIX}" and info.folder == target
-    assert {"msfp_model.h", "unit.c", "manifest.json"} <= {path.name for path in target.iterdir()}
+    assert {"derived", "runtime", "manifest.json"} <= {path.name for path in target.iterdir()}
+    assert (target / "derived" / "msfp_model.h").is_file() and (target / "runtime" / "unit.c").is_file()
     code = f"import sys; sys.path.insert(0, {str(target)!r}); import {MODULE}; print({MODULE}.twice(4.0))"
     done = subprocess.run([sys.executable, "-I", "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "8.0\n"
     script = target / "mine.py"
     script.write_text("mine\n")
-    (target / "unit.c").write_text("damaged\n")
+    unit = target / "runtime" / "unit.c"
+    unit.write_text("damaged\n")
     build.generate_to(SPEC, target)
-    assert script.read_text() == "mine\n" and (target / "unit.c").read_text() == fake_model.RUNTIME
+    assert script.read_text() == "mine\n" and unit.read_text() == fake_model.RUNTIME
 
 
 def test_generate_to_never_touches_what_is_not_ours(models: Path, tmp_path: Path) -> None:

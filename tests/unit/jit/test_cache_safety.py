@@ -120,7 +120,7 @@ def test_altered_sources_are_not_handed_out(prebuilt: Path, tmp_path: Path) -> N
     (build.prepare(SPEC, portable=True).folder / "unit.c").write_text("int evil;\n")
     with pytest.warns(RuntimeWarning, match="damaged"):
         build.generate_to(SPEC, tmp_path / "out")
-    assert (tmp_path / "out" / "unit.c").read_text() == fake_model.RUNTIME
+    assert (tmp_path / "out" / "runtime" / "unit.c").read_text() == fake_model.RUNTIME
 
 
 def test_an_altered_object_of_the_wrapper_is_made_again(entry: cache.Entry) -> None:

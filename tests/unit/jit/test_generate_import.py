@@ -88,7 +88,7 @@ def test_plain_script_imports_nothing_but_the_folder(folder: Path, tmp_path: Pat
 
 
 def test_folder_holds_sources_with_their_log_and_no_part_files(folder: Path) -> None:
-    names = {path.name for path in folder.iterdir()}
+    names = {path.name for path in folder.rglob("*")}
     assert {
         "msfp_model.h",
         "msfp_kernels.h",
@@ -103,7 +103,7 @@ def test_folder_holds_sources_with_their_log_and_no_part_files(folder: Path) -> 
 def test_readme_names_every_file_value_and_status(folder: Path) -> None:
     text = (folder / README).read_text(encoding="utf-8")
     named = set(re.findall(r"`([\w.]+)`", text))
-    files = {path.name for path in folder.iterdir()} - {README}
+    files = {path.name for path in folder.rglob("*") if path.is_file()} - {README}
     assert {name for name in files if not name.endswith((".so", ".pyd"))} <= named
     assert {name for name in named if name.endswith((".c", ".h", ".pyx"))} <= files
     for entries in (contract.BODY, contract.SURFACE, contract.TOP, contract.row(REPORT), contract.EVENT_KINDS):
@@ -112,10 +112,28 @@ def test_readme_names_every_file_value_and_status(folder: Path) -> None:
     assert {status.name for status in contract.STATUSES if status.compiled} <= named
 
 
+def test_example_of_the_readme_runs(folder: Path) -> None:
+    code = re.search(r"^```python\n(.*?)^```", (folder / README).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert code
+    done = subprocess.run([sys.executable, "-c", code[1]], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("ok") and float(done.stdout.split()[-1]) < 1e-6
+
+
+def test_derived_and_shared_sources_lie_apart(folder: Path) -> None:
+    """What is in `runtime` is the same for every model, what is in `derived` names this one."""
+    shared = {path.name: path.read_text(encoding="utf-8") for path in (folder / "runtime").glob("*.[ch]")}
+    derived = {path.name: path.read_text(encoding="utf-8") for path in (folder / "derived").iterdir()}
+    assert {"msfp_kernels.h", "msfp_schedule.h", "msfp_model.h"} <= set(derived)
+    assert {"run.c", "contact.c", "msfp.h"} <= set(shared)
+    assert not [name for name, text in shared.items() if "for 5_2_2" in text or "MSFP_N 5" in text]
+    assert {path.suffix for path in folder.iterdir() if path.is_file()} <= {".so", ".pyd", ".json", ".log", ".md"}
+
+
 def run_program(folder: Path, place: Path, *flags: str) -> str:
     """Compile the C program with the sources of a folder, and return what it prints."""
     place.mkdir()
-    for path in (MAIN, *folder.glob("*.[ch]")):
+    for path in (MAIN, *folder.rglob("*.[ch]")):
         if path.name not in ("msfp_entry.c", "example.c"):  # the entry is of the wrapper, the example has its own main
             shutil.copy(path, place)
     units = sorted(path.name for path in place.glob("*.c"))
@@ -141,7 +159,7 @@ def printed(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
 
 
 def test_no_c_file_needs_python(folder: Path) -> None:
-    assert not [path.name for path in folder.glob("*.[ch]") if "Python.h" in path.read_text(encoding="utf-8")]
+    assert not [path.name for path in folder.rglob("*.[ch]") if "Python.h" in path.read_text(encoding="utf-8")]
 
 
 def test_program_evaluates_as_python_does(printed: dict[str, Array]) -> None:
