@@ -44,6 +44,11 @@ class Stack(Protocol):
         All [SI]; the friction rates are those of Y and Z [1/s].
         """
 
+    def many_accelerations(
+        self, q: Array, v: Array, f: Array, base: Array, load: Array
+    ) -> tuple[Any, Array, Array, Array]:
+        """Of k states, each array with a leading axis: statuses (k,), accelerations, rows, friction rates [SI]."""
+
     def observe(
         self, q: Array, v: Array, a: Array, f: Array, base: Array, load: Array, **state: Array
     ) -> tuple[Array, Array, Array, int]:
@@ -284,6 +289,13 @@ def vector(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Ar
     if not np.isfinite(array).all():
         raise InputError(f"{name} has an entry that is not finite: give finite numbers [{unit}]")
     return array
+
+
+def many(value: ArrayLike, name: str, shape: tuple[int, ...], count: int) -> Array:
+    """As `vector`, with a leading axis of `count` [SI]; one array of the given shape serves all."""
+    if np.ndim(value) == len(shape):
+        value = np.broadcast_to(vector(value, name, shape, "SI"), (count, *shape))
+    return vector(value, name, (count, *shape), "SI")
 
 
 def bodies_and_surfaces(bearing: Bearing, effects: Effects, top: Top | None = None) -> tuple[Array, Array]:

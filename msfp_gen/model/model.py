@@ -20,6 +20,7 @@ from msfp_gen.model.compiled import (
     bodies_and_surfaces,
     columns,
     free_coordinates,
+    many,
     named_vectors,
     separations_at_rest,
     state_columns,
@@ -232,6 +233,47 @@ class Model:
                 status=status,
             )
         return self._evaluation(state, a, row, rates, residual, iterations, sign)
+
+    def accelerations(
+        self,
+        bearing: Bearing,
+        q: ArrayLike,
+        v: ArrayLike,
+        h: ArrayLike,
+        *,
+        base: ArrayLike | None = None,
+        load: ArrayLike | None = None,
+        top: Top | None = None,
+    ) -> dict[str, Array]:
+        """Accelerations of many states at once, at the cost of the C code.
+
+        q, v, h: as of `evaluate`, with a leading axis, (k, ...). base: displacements with rotations, rates and
+        accelerations, shape (3, 6) or (k, 3, 6) [SI]; load: force and moment on the top plate at r_nn, (6,) or (k, 6)
+        [N], [N m]; None: zero. top: springs and mass above, None: none. Returns "acceleration" of the shape of q
+        [rad/s^2] (separations [m/s^2]), "friction_rate" (k, n-1, 2) [1/s], and the row of every state as by `unpack`.
+        A planar model takes states in the E1-E3 plane. Raises InputError for wrong shapes and massless models,
+        RunError where a state has no acceleration.
+        """
+        if self.effects.sliders == "massless":
+            raise InputError("accelerations: a massless model does not determine them; use sliders = 'inertial'")
+        shape, count = self._shape, len(np.asarray(q))
+        shapes = {"q": shape, "v": shape, "h": (shape[0], 2), "base": (3, 6), "load": (6,)}
+        given = {"q": q, "v": v, "h": h, "base": np.zeros((3, 6)) if base is None else base}
+        arrays = {
+            name: many(value, name, shapes[name], count)
+            for name, value in (given | {"load": np.zeros(6) if load is None else load}).items()
+        }
+        if self.planar:
+            across = {"q": [0, 2], "v": [0, 2], "h": [1], "base": [1, 3, 5], "load": [1, 3, 5]}
+            for name, axes in across.items():
+                if np.any(arrays[name][..., axes]):
+                    raise InputError(f"{name} leaves the E1-E3 plane: give states in it, or dimension = 'spatial'")
+        status, a, rows, rates = self.stack(bearing, top).many_accelerations(*arrays.values())
+        if (failed := np.flatnonzero(status != self.extension.OK)).size:
+            raise RunError(
+                f"accelerations: state {failed[0]} has none; evaluate it alone for the reason", status="failed"
+            )
+        return {"acceleration": a, "friction_rate": rates, **self.unpack(rows)}
 
     def _heat(self, bearing: Bearing, temperature: ArrayLike | None) -> dict[str, Array]:
         """Keyword `memory` of the stack: temperature above its start value, shape (n-1,) [K]."""

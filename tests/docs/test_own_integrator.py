@@ -1,0 +1,91 @@
+"""docs/own_integrator.md runs: its methods have their orders, and give what `simulate` gives."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from support import ROOT
+
+from msfp_gen import InputError, Scene, Solver, simulate
+
+PAGE = ROOT / "docs" / "own_integrator.md"
+
+
+@pytest.fixture(scope="module")
+def page() -> dict[str, Any]:
+    """The names that the page defines, after it ran."""
+    space: dict[str, Any] = {}
+    for block in re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
+        exec(block, space)
+    return space
+
+
+def test_the_midpoint_rule_is_sixteen_lines():
+    block = re.search(r"^def midpoint\(.*?^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)[0]
+    assert len(block.splitlines()) - 1 <= 18
+
+
+def test_methods_tend_to_what_simulate_gives(page):
+    scene = Scene(
+        bearing=page["bearing"],
+        motion=page["motion"],
+        top=page["top"],
+        duration=0.5,
+        output_step=2e-3,
+        effects=page["model"].effects,
+        solver=Solver(rtol=1e-7),
+    )
+    want = simulate(scene).history.tilt_angles[:, :, 1]
+    size = np.abs(want).max()
+    fine = page["fine"][:, :, 1]
+    assert fine.shape == want.shape and np.abs(fine - want).max() < 1e-3 * size
+    for name in ("midpoint", "bdf2"):
+        run = page[name]
+        errors = [
+            np.abs(run(page["stack"], page["base"], page["load"], 0.5, 1e-2 / n)[::n, :, 1] - want[::5]).max()
+            for n in (1, 4)
+        ]
+        assert errors[1] < 2e-3 * size, name
+        assert errors[0] / errors[1] > 8, name  # 16 by order 2
+    found = page["solve_ivp"](
+        page["fun"], (0, 0.5), page["y0"], method="Radau", jac=page["jac"], rtol=1e-6, atol=1e-8
+    ).y[:6, -1]
+    assert np.abs(found.reshape(2, 3)[:, 1] - want[-1]).max() < 1e-4 * size
+
+
+def test_many_states_are_the_states_one_by_one(page):
+    model, bearing, top = page["model"], page["bearing"], page["top"]
+    rng = np.random.default_rng(1)
+    plane = np.array([0.0, 1.0, 0.0])
+    q, v = (rng.uniform(-0.02, 0.02, (7, 2, 3)) * plane for _ in range(2))
+    h = rng.uniform(-0.9, 0.9, (7, 2, 2)) * [1.0, 0.0]
+    base, load = np.zeros((7, 3, 6)), np.zeros((7, 6))
+    base[:, 2, 0], load[:, 2] = rng.uniform(-2, 2, 7), rng.uniform(-4e5, -2e5, 7)
+    many = model.accelerations(bearing, q, v, h, base=base, load=load, top=top)
+    stack = model.stack(bearing, top)
+    for i in range(7):
+        status, a, row, rates, *_ = stack.accelerations(q[i], v[i], h[i], base[i], load[i])
+        assert status == "ok"
+        assert np.array_equal(many["acceleration"][i], a) and np.array_equal(many["friction_rate"][i], rates)
+        for name, value in model.unpack(row).items():
+            assert np.array_equal(many[name][i], value, equal_nan=True)
+    shared = model.accelerations(bearing, q, v, h, base=base[0], load=load[0], top=top)
+    assert np.array_equal(shared["acceleration"][0], many["acceleration"][0])
+
+
+def test_wrong_states_are_named(page):
+    model, bearing = page["model"], page["bearing"]
+    q, h = np.zeros((3, 2, 3)), np.zeros((3, 2, 2))
+    with pytest.raises(InputError, match="v has shape"):
+        model.accelerations(bearing, q, q[:2], h)
+    with pytest.raises(InputError, match="q leaves the E1-E3 plane"):
+        model.accelerations(bearing, q + np.array([0.1, 0.0, 0.0]), q, h)
+    with pytest.raises(InputError, match="finite"):
+        model.accelerations(bearing, q * np.nan, q, h)
+    lifted = np.zeros((3, 6))
+    lifted[1, 2] = np.nan
+    with pytest.raises(InputError, match="load"):
+        model.accelerations(bearing, q, q, h, load=lifted)
