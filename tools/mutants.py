@@ -49,7 +49,7 @@ PARTS = {
     "generator": Part("generator/*.py", (EQUATIONS, "tests/unit/generator"), True),
     "runtime": Part("msfp_gen/runtime/**/*.c", (RUNS, "tests/physics/test_loads.py"), True),
     "simulation": Part("msfp_gen/simulation/*.py", ("tests/unit/simulation",)),
-    "results": Part("msfp_gen/results/**/*.py", ("tests/unit/results", "tests/unit/simulation/test_stream.py")),
+    "results": Part("msfp_gen/results/**/*.py", ("tests/unit/results", "tests/unit/simulation/test_segment_ends.py")),
 }
 # Pattern of files that no test imports -> the tests of what they compute, those first that build few models.
 CHOSEN: dict[str, tuple[str, ...]] = {
@@ -87,7 +87,7 @@ CHOSEN: dict[str, tuple[str, ...]] = {
         "tests/physics/test_friction_laws.py",
         "tests/unit/simulation/test_failures.py",
     ),
-    "*/runtime/run/snapshot.c": ("tests/unit/simulation/test_checkpoint.py", "tests/unit/simulation/test_stream.py"),
+    "*/runtime/run/snapshot.c": ("tests/unit/simulation/test_checkpoint.py",),
     "*/runtime/run/*": (RUNS, "tests/hard/test_limits.py", "tests/hard/test_rims.py", "tests/hard/test_ladder.py"),
     "*/runtime/gradients/*": ("tests/physics/test_gradients.py", "tests/unit/simulation/test_gradients.py"),
     "*/runtime/port/*": ("tests/unit/embedding/test_two_port.py", "tests/physics/test_two_port.py"),
