@@ -154,14 +154,16 @@ class Building:
     def boundary(self) -> tuple[int, ...]:
         """Indices of the coordinates of the nodes that carry bearings. Raises InputError where nodes share any."""
         boundary: list[int] = []
+        first: dict[int, Node] = {}  # of each coordinate
         for node in self.nodes:
             if node.carries:
                 own = np.flatnonzero(np.any(node.rows, axis=0)).tolist()
-                if shared := set(own) & set(boundary):
+                if (shared := first.keys() & set(own)) and not _linked(node, [first.get(index) for index in own]):
                     raise InputError(f"building.nodes[{node.name!r}]: coordinate {min(shared)} is that of another node")
                 if len(own) != FREEDOMS or np.linalg.matrix_rank(node.rows[:, own]) < FREEDOMS:
                     raise InputError(f"building.nodes[{node.name!r}] depends on {own}: give six different coordinates")
-                boundary += own
+                boundary += [] if shared else own
+                first = dict.fromkeys(own, node) | first
         if not boundary:
             raise InputError("building.nodes: none carries bearings; give at least one with its six coordinates")
         return tuple(sorted(boundary))
@@ -290,6 +292,14 @@ class Building:
         rows[fixed.boundary] = np.eye(len(fixed.boundary))
         rows[fixed.inner] = fixed.follow
         return rows
+
+
+def _linked(node: Node, others: Sequence[Node | None]) -> bool:
+    """Whether a node is part of the rigid body of one other, whose coordinates it has."""
+    body = others[0]
+    if body is None or any(other is not body for other in others):
+        return False
+    return np.allclose(node.rows, body.linked(node.position), rtol=0.0, atol=1e-9 * float(np.abs(node.rows).max()))
 
 
 def _congruent(matrix: Array, basis: Array) -> Array:

@@ -19,8 +19,14 @@ typedef struct {
     long used;       /* when it was last used */
     double *factors; /* [n][n] of A */
     double *follow;  /* [attachments][n] A^-1 P, with P the columns of the attachments in the unit matrix */
-    double *mobility, *mobility_factors; /* [attachments]^2: P^T A^-1 P */
+    double *mobility, *mobility_factors; /* [attachments]^2: P^T A^-1 P, by columns */
 } linear;
+
+/* The columns of each of several sets of rows in which any of its rows is not zero. */
+typedef struct {
+    int *begin;   /* [sets + 1] of each set in `columns` */
+    int *columns; /* rising in each set */
+} pattern;
 
 /* A bearing in the stage that is being solved. */
 typedef struct {
@@ -56,13 +62,17 @@ struct msfp_building {
     /* State between two steps; pass_state (state.c) lists what a snapshot holds. */
     double t, h, previous_error, energy, energies[ENERGIES];
     double tangent_beta; /* of `tangent` [s]; 0: none */
+    double factored_beta; /* of `matrix` [s]; 0: none */
     int stop, jump, span, next_row;
     long counts[MSFP_BUILDING_COUNTS];
     double *u, *v, *a;  /* [n] */
     double *slope;      /* [n] rate of change of `a` over the last step */
-    double *tangent;    /* [attachments]^2 sum of the derivatives of the bearings */
+    double *tangent;    /* [attachments]^2 sum of the derivatives of the bearings; other entries than `coupled` are 0 */
     double *force;      /* [attachments] forces of the bearings less those at rest */
     /* The step in progress. */
+    pattern moved;   /* attachments that each bearing moves with */
+    pattern coupled; /* attachments that share a bearing with each attachment */
+    pattern watched; /* coordinates that each vector of the scene depends on */
     linear linear[FACTORS], *now;
     long clock;
     int solving;   /* stage */
@@ -75,7 +85,8 @@ struct msfp_building {
     double *scale;               /* [attachments] of these [N], [N m] */
     double *matrix;              /* [attachments]^2 */
     int *pivots;
-    double *next_u;              /* [n] */
+    double *next_u, *product;    /* [n] */
+    double next_energies[2];     /* kinetic and strain energy at the end of the step [J] */
     double *scratch;             /* [3][attachments] */
     int status, bearing, surface;
     double value;
@@ -95,14 +106,28 @@ void for_each_bearing(msfp_building *b, task *what);
 
 /* ---- linear.c ---- */
 
-/* y = A x or y += A x, of a symmetric matrix [n][n]. */
-void multiply(int n, const double *matrix, const double *x, int add, double *y);
+/* y += A x, of a matrix of n rows by its columns. Each row is summed in the order of the columns. */
+void add_columns(int n, int columns, const double *matrix, const double *x, double *y);
+/* y = A x, of a matrix [n][n] by its columns, such as a symmetric one. */
+void multiply(int n, const double *matrix, const double *x, double *y);
 double dot(int n, const double *x, const double *y);
+/* The pattern of `sets` times `height` rows of n numbers; MSFP_OK or MSFP_E_MEMORY. */
+int find_pattern(pattern *p, const double *rows, int sets, int height, int n);
+/* The columns of a set. */
+static inline const int *columns_of(const pattern *p, int set, int *count)
+{
+    *count = p->begin[set + 1] - p->begin[set];
+    return p->columns + p->begin[set];
+}
+/* The sum of row[c] x[c] over some columns. */
+double dot_at(int count, const int *columns, const double *row, const double *x);
+/* Patterns of the scene; MSFP_OK or MSFP_E_MEMORY. */
+int find_patterns(msfp_building *b);
 /* Factors at that beta [s], into b->now. */
 int factor_linear(msfp_building *b, double beta);
 /* x = A^-1 x [n]. */
 void solve_linear(msfp_building *b, double *x);
-/* Factors of I + mobility * tangent, into b->matrix. */
+/* Factors of I + mobility * tangent, into b->matrix, unless they are there. */
 int factor_tangent(msfp_building *b);
 /* x = (I + mobility * tangent)^-1 x [attachments]. */
 void solve_tangent(msfp_building *b, double *x);
@@ -115,8 +140,6 @@ void ground_at(msfp_building *b, double t);
 /* One step of length h [s], not accepted: its error over the tolerance, the share at which the first event lies, and the
  * bearing, from 1, with the largest error; 0: the building. */
 int try_step(msfp_building *b, double h, double *error, double *share, int *worst);
-/* Kinetic and strain energy of the present state [J]; the largest energy of the building so far, with them. */
-void note_energy(msfp_building *b, double energies[2]);
 /* The status of the first bearing that has failed, which is noted. */
 int first_failure(msfp_building *b);
 /* Motion of both ends of each bearing at the present state, into the members. */

@@ -1,17 +1,32 @@
 /* linear.c: the linear equations of a stage. With M a + C v + K u + P f = 0, u = Q + beta v and a = (v - V)/beta,
  * the rates v = A^-1 (M V/beta - K Q) - A^-1 P f follow from the forces f at the attachments. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* vectorises products of matrices */
+#endif
 #include <stdlib.h>
 #include <string.h>
 #include "building.h"
 
-void multiply(int n, const double *matrix, const double *x, int add, double *y)
+/* Four columns at a time, so that a sum is loaded and stored once for four products. */
+void add_columns(int n, int columns, const double *restrict matrix, const double *restrict x, double *restrict y)
 {
-    for (int i = 0; i < n; ++i) {
-        double sum = 0.0;
-        for (int j = 0; j < n; ++j)
-            sum += matrix[(size_t)i * n + j] * x[j];
-        y[i] = add ? y[i] + sum : sum;
+    const size_t height = n;
+    int j = 0;
+    for (; j + 4 <= columns; j += 4, matrix += 4 * height) {
+        const double *p = matrix, *q = p + height, *r = q + height, *s = r + height;
+        const double a = x[j], b = x[j + 1], c = x[j + 2], d = x[j + 3];
+        for (size_t i = 0; i < height; ++i)
+            y[i] = (((y[i] + p[i] * a) + q[i] * b) + r[i] * c) + s[i] * d;
     }
+    for (; j < columns; ++j, matrix += height)
+        for (size_t i = 0; i < height; ++i)
+            y[i] += matrix[i] * x[j];
+}
+
+void multiply(int n, const double *matrix, const double *x, double *y)
+{
+    memset(y, 0, (size_t)n * sizeof *y);
+    add_columns(n, n, matrix, x, y);
 }
 
 double dot(int n, const double *x, const double *y)
@@ -21,6 +36,71 @@ double dot(int n, const double *x, const double *y)
         sum += x[i] * y[i];
     return sum;
 }
+
+/* ---- where matrices are not zero ---- */
+
+double dot_at(int count, const int *columns, const double *row, const double *x)
+{
+    double sum = 0.0;
+    for (int i = 0; i < count; ++i)
+        sum += row[columns[i]] * x[columns[i]];
+    return sum;
+}
+
+static int is_zero(const double *column, int height, int n)
+{
+    for (int i = 0; i < height; ++i)
+        if (column[(size_t)i * n] != 0.0)
+            return 0;
+    return 1;
+}
+
+int find_pattern(pattern *p, const double *rows, int sets, int height, int n)
+{
+    size_t count = 0;
+    for (int pass = 0; pass < 2; ++pass) { /* count, then store */
+        if (pass) {
+            p->begin = calloc((size_t)sets + 1, sizeof *p->begin);
+            p->columns = calloc(count + 1, sizeof *p->columns);
+            if (!p->begin || !p->columns)
+                return MSFP_E_MEMORY;
+            count = 0;
+        }
+        for (int k = 0; k < sets; ++k) {
+            for (int c = 0; c < n; ++c)
+                if (!is_zero(rows + (size_t)k * height * n + c, height, n)) {
+                    if (pass)
+                        p->columns[count] = c;
+                    ++count;
+                }
+            if (pass)
+                p->begin[k + 1] = (int)count;
+        }
+    }
+    return MSFP_OK;
+}
+
+int find_patterns(msfp_building *b)
+{
+    const msfp_building_scene *s = &b->scene;
+    const size_t r = s->attachments;
+    double *shared = calloc(r * r + 1, sizeof *shared); /* 1 where a bearing moves with both */
+    int status = shared ? MSFP_OK : MSFP_E_MEMORY;
+    status = status ? status : find_pattern(&b->moved, s->rows, s->bearings, MSFP_WRENCH, s->attachments);
+    status = status ? status : find_pattern(&b->watched, s->vector_rows, s->vectors, 3, s->n);
+    for (int j = 0; j < s->bearings && !status; ++j) {
+        int count;
+        const int *own = columns_of(&b->moved, j, &count);
+        for (int i = 0; i < count; ++i)
+            for (int k = 0; k < count; ++k)
+                shared[own[i] * r + own[k]] = 1.0;
+    }
+    status = status ? status : find_pattern(&b->coupled, shared, s->attachments, 1, s->attachments);
+    free(shared);
+    return status;
+}
+
+/* ---- factors ---- */
 
 static void release(linear *l)
 {
@@ -93,8 +173,8 @@ int factor_linear(msfp_building *b, double beta)
     s->lapack.potrs(lower, &n, &r, l->factors, &n, l->follow, &n, &info);
     for (int k = 0; k < r; ++k)
         for (int i = 0; i < r; ++i)
-            l->mobility[(size_t)k * r + i] = l->follow[(size_t)k * n + s->attached[i]];
-    memcpy(l->mobility_factors, l->mobility, (size_t)r * r * sizeof(double));
+            l->mobility_factors[(size_t)k * r + i] = l->mobility[(size_t)i * r + k] =
+                l->follow[(size_t)k * n + s->attached[i]];
     s->lapack.potrf(lower, &r, l->mobility_factors, &r, &info);
     if (info)
         return MSFP_E_IRREGULAR;
@@ -111,15 +191,19 @@ void solve_linear(msfp_building *b, double *x)
 
 int factor_tangent(msfp_building *b)
 {
-    int r = b->scene.attachments, info;
-    for (int k = 0; k < r; ++k) /* by columns; the mobility is symmetric */
-        for (int i = 0; i < r; ++i) {
-            double sum = i == k;
-            for (int l = 0; l < r; ++l)
-                sum += b->now->mobility[(size_t)i * r + l] * b->tangent[(size_t)l * r + k];
-            b->matrix[(size_t)k * r + i] = sum;
-        }
+    int r = b->scene.attachments, info, count;
+    if (b->factored_beta == b->now->beta)
+        return MSFP_OK;
+    memset(b->matrix, 0, (size_t)r * r * sizeof *b->matrix);
+    for (int k = 0; k < r; ++k) {
+        double *column = b->matrix + (size_t)k * r;
+        const int *rows = columns_of(&b->coupled, k, &count);
+        column[k] = 1.0;
+        for (int l = 0; l < count; ++l)
+            add_columns(r, 1, b->now->mobility + (size_t)rows[l] * r, b->tangent + (size_t)rows[l] * r + k, column);
+    }
     b->scene.lapack.getrf(&r, &r, b->matrix, &r, b->pivots, &info);
+    b->factored_beta = info ? 0.0 : b->now->beta;
     return info ? MSFP_E_IRREGULAR : MSFP_OK;
 }
 

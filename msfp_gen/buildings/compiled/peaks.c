@@ -79,20 +79,22 @@ void note_peaks(msfp_building *b)
 {
     const msfp_building_scene *s = &b->scene;
     const double *motions[3] = { b->u, b->v, b->a }, *row = s->vector_rows;
-    double *at = b->peaks, energies[ENERGY];
+    double *at = b->peaks;
     for (int k = 0; k < s->vectors; ++k) {
         double vector[3];
+        int count;
+        const int *columns = columns_of(&b->watched, k, &count);
         for (int i = 0; i < 3; ++i, row += s->n) {
-            vector[i] = dot(s->n, row, motions[s->vector_orders[k]]);
+            vector[i] = dot_at(count, columns, row, motions[s->vector_orders[k]]);
             for (int g = 0; g < s->grounds; ++g)
                 vector[i] -= s->vector_grounds[k * s->grounds + g] * b->ground[g * MSFP_GROUND + i];
         }
         at = take_vector(at, vector);
     }
     at = take_base(b, at);
-    note_energy(b, energies);
     for (int i = 0; i < ENERGY; ++i)
-        at[i] = fmax(at[i], energies[i]);
+        at[i] = fmax(at[i], b->next_energies[i]);
+    b->energy = fmax(b->energy, b->next_energies[0] + b->next_energies[1]);
 }
 
 /* The third axis t3 of (2.6) for two angles. */

@@ -18,7 +18,7 @@ static int allocate(msfp_building *b)
     } arrays[] = { { &b->u, n },           { &b->v, n },        { &b->a, n },       { &b->slope, n },
                    { &b->tangent, r * r }, { &b->force, r },    { &b->Q, n },       { &b->V, n },
                    { &b->free, n },        { &b->x, r },        { &b->residual, r }, { &b->change, r },
-                   { &b->balance, r },     { &b->scale, r },    { &b->matrix, r * r }, { &b->next_u, n },
+                   { &b->balance, r },     { &b->scale, r },    { &b->matrix, r * r }, { &b->next_u, n }, { &b->product, n },
                    { &b->scratch, 3 * r }, { &b->stage_v, stages * n }, { &b->stage_a, stages * n },
                    { &b->ground, (size_t)b->scene.grounds * MSFP_GROUND }, { &b->peaks, peak_count(b) } };
     int complete = 1;
@@ -111,7 +111,7 @@ msfp_building *msfp_building_new(const msfp_building_scene *scene)
     if (!b)
         return NULL;
     b->scene = *scene;
-    if (allocate(b) || pool_begin(b)) {
+    if (allocate(b) || find_patterns(b) || pool_begin(b)) {
         msfp_building_free(b);
         return NULL;
     }
@@ -133,9 +133,10 @@ void msfp_building_free(msfp_building *b)
     for (int i = 0; b->members && i < b->scene.bearings; ++i)
         free(b->members[i].row);
     void *all[] = { b->u,       b->v,      b->a,       b->slope,  b->tangent, b->force,   b->Q,       b->V,
-                    b->free,    b->x,      b->residual, b->change, b->balance, b->scale,   b->matrix,  b->next_u,
+                    b->free,    b->x,      b->residual, b->change, b->balance, b->scale,   b->matrix,  b->next_u, b->product,
                     b->scratch, b->ground, b->stage_v, b->stage_a, b->members, b->piece,   b->pivots,  b->rows,
-                    b->entries, b->faces,  b->peaks };
+                    b->entries, b->faces,  b->peaks,   b->moved.begin, b->moved.columns, b->coupled.begin,
+                    b->coupled.columns, b->watched.begin, b->watched.columns };
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         free(all[i]);
     free(b);
@@ -292,7 +293,7 @@ int msfp_building_replaced(msfp_building *b, int bearing, const int *entries, co
     memcpy(b->faces + bearing * MSFP_FACES, faces, MSFP_FACES * sizeof *faces);
     free(m->row);
     m->row = NULL;
-    b->tangent_beta = 0.0;
+    b->tangent_beta = b->factored_beta = 0.0;
     b->h = fmin(b->h, 1e-3);
     memset(b->slope, 0, (size_t)b->scene.n * sizeof *b->slope);
     b->status = part->api->port_wrench(part->port, m->wrench);

@@ -55,12 +55,14 @@ static void set_ends(msfp_building *b, int bearing, const double *u, const doubl
     const msfp_building_scene *s = &b->scene;
     const double *ground = b->ground + s->ground_of[bearing] * MSFP_GROUND, *motion[3] = { u, v, a };
     const double *rows = s->rows + (size_t)bearing * MSFP_WRENCH * s->attachments;
+    int count;
+    const int *own = columns_of(&b->moved, bearing, &count);
     double *ends = b->members[bearing].ends;
     memset(ends, 0, sizeof b->members[bearing].ends);
     for (int order = 0; order < 3; ++order) {
         memcpy(ends + order * MSFP_WRENCH, ground + 3 * order, 3 * sizeof *ends);
         for (int i = 0; i < MSFP_WRENCH; ++i)
-            ends[(3 + order) * MSFP_WRENCH + i] = dot(s->attachments, rows + (size_t)i * s->attachments, motion[order]);
+            ends[(3 + order) * MSFP_WRENCH + i] = dot_at(count, own, rows + (size_t)i * s->attachments, motion[order]);
     }
 }
 
@@ -170,13 +172,15 @@ static double evaluate(msfp_building *b, double beta)
     memset(b->force, 0, (size_t)r * sizeof *b->force);
     for (int j = 0; j < s->bearings; ++j) {
         const member *m = &b->members[j];
+        int count;
+        const int *own = columns_of(&b->moved, j, &count);
         for (int k = 0; k < MSFP_WRENCH; ++k) {
             const double *row = s->rows + ((size_t)j * MSFP_WRENCH + k) * r, beyond = m->wrench[MSFP_WRENCH + k] - m->rest[k];
-            for (int i = 0; i < r; ++i)
-                b->force[i] += row[i] * beyond;
+            for (int i = 0; i < count; ++i)
+                b->force[own[i]] += row[own[i]] * beyond;
         }
     }
-    multiply(r, b->now->mobility, b->force, 0, b->residual);
+    multiply(r, b->now->mobility, b->force, b->residual);
     for (int i = 0; i < r; ++i)
         b->residual[i] += b->x[i] - b->free[s->attached[i]];
     memcpy(b->balance, b->residual, (size_t)r * sizeof *b->balance);
@@ -201,16 +205,19 @@ static int differentiate(msfp_building *b, double beta)
     memset(b->tangent, 0, r * r * sizeof *b->tangent);
     for (int j = 0; j < s->bearings; ++j) {
         const double *rows = s->rows + (size_t)j * MSFP_WRENCH * r, *d = b->members[j].derivative;
+        int count;
+        const int *own = columns_of(&b->moved, j, &count);
         for (int k = 0; k < MSFP_WRENCH; ++k)
-            for (size_t c = 0; c < r; ++c) {
+            for (int c = 0; c < count; ++c) {
                 double sum = 0.0;
                 for (int l = 0; l < MSFP_WRENCH; ++l)
-                    sum += d[k * MSFP_WRENCH + l] * rows[l * r + c];
-                for (size_t i = 0; i < r && sum != 0.0; ++i)
-                    b->tangent[i * r + c] += rows[k * r + i] * sum;
+                    sum += d[k * MSFP_WRENCH + l] * rows[l * r + own[c]];
+                for (int i = 0; i < count; ++i)
+                    b->tangent[own[i] * r + own[c]] += rows[k * r + own[i]] * sum;
             }
     }
     b->tangent_beta = beta;
+    b->factored_beta = 0.0;
     return factor_tangent(b);
 }
 
@@ -280,12 +287,10 @@ static void begin_stage(msfp_building *b, int i, double h)
         msfp_add(b->Q, b->stage_v + (size_t)j * n, h * m->weights[i][j], n);
         msfp_add(b->V, b->stage_a + (size_t)j * n, h * m->weights[i][j], n);
     }
-    multiply(n, b->scene.mass, b->V, 0, b->free);
+    multiply(n, b->scene.mass, b->V, b->free);
+    multiply(n, b->scene.stiffness, b->Q, b->product);
     for (int k = 0; k < n; ++k)
-        b->free[k] /= -beta;
-    multiply(n, b->scene.stiffness, b->Q, 1, b->free);
-    for (int k = 0; k < n; ++k)
-        b->free[k] = -b->free[k];
+        b->free[k] = -(b->free[k] / -beta + b->product[k]);
     solve_linear(b, b->free);
     for (int k = 0; k < b->scene.attachments; ++k) {
         const int c = b->scene.attached[k];
@@ -295,6 +300,14 @@ static void begin_stage(msfp_building *b, int i, double h)
     }
 }
 
+/* The rates v of all coordinates with those that forces at the attachments take from them. */
+static void follow_back(msfp_building *b, const double *force, double *v)
+{
+    for (int k = 0; k < b->scene.attachments; ++k)
+        b->scratch[k] = -force[k];
+    add_columns(b->scene.n, b->scene.attachments, b->now->follow, b->scratch, v);
+}
+
 /* Rates and accelerations of all coordinates in the stage just solved, and powers. */
 static void end_stage(msfp_building *b, int i, double beta)
 {
@@ -302,13 +315,11 @@ static void end_stage(msfp_building *b, int i, double beta)
     const size_t n = s->n;
     double *v = b->stage_v + i * n, *a = b->stage_a + i * n, *power = b->power[i];
     memcpy(v, b->free, n * sizeof *v);
-    for (int k = 0; k < s->attachments; ++k)
-        for (size_t c = 0; c < n; ++c)
-            v[c] -= b->now->follow[k * n + c] * b->force[k];
+    follow_back(b, b->force, v);
     for (size_t c = 0; c < n; ++c)
         a[c] = (v[c] - b->V[c]) / beta;
-    multiply(s->n, s->damping, v, 0, b->next_u);
-    power[DAMPED] = dot(s->n, v, b->next_u);
+    multiply(s->n, s->damping, v, b->product);
+    power[DAMPED] = dot(s->n, v, b->product);
     power[RECEIVED] = power[GROUND] = 0.0;
     for (int k = 0; k < s->attachments; ++k)
         power[RECEIVED] -= b->force[k] * v[s->attached[k]];
@@ -320,28 +331,28 @@ static void end_stage(msfp_building *b, int i, double beta)
 static double energies_of(msfp_building *b, const double *u, const double *v, double *product, double energies[2])
 {
     const int n = b->scene.n;
-    multiply(n, b->scene.mass, v, 0, product);
+    multiply(n, b->scene.mass, v, product);
     energies[0] = 0.5 * dot(n, v, product);
-    multiply(n, b->scene.stiffness, u, 0, product);
+    multiply(n, b->scene.stiffness, u, product);
     energies[1] = 0.5 * dot(n, u, product);
     return energies[0] + energies[1];
 }
 
-static double energy_of(msfp_building *b, const double *u, const double *v, double *product)
+/* The product of the tangent and a vector of the attachments. */
+static void push(const msfp_building *b, const double *x, double *force)
 {
-    double energies[2];
-    return energies_of(b, u, v, product, energies);
-}
-
-void note_energy(msfp_building *b, double energies[2])
-{
-    b->energy = fmax(b->energy, energies_of(b, b->u, b->v, b->Q, energies));
+    const size_t r = b->scene.attachments;
+    for (size_t i = 0; i < r; ++i) {
+        int count;
+        const int *columns = columns_of(&b->coupled, (int)i, &count);
+        force[i] = dot_at(count, columns, b->tangent + i * r, x);
+    }
 }
 
 /* Error of the building in the norm of energy, over the tolerance. The embedded estimate of a stiff mode is as large as
  * its ringing, which the method damps, so the estimate is filtered as those of the bearings are (Hosea and Shampine
- * 1996): the last stage is solved with its history moved by it. */
-static double building_error(msfp_building *b, double h)
+ * 1996): the last stage is solved with its history moved by it. whole: energy at the end of the step [J]. */
+static double building_error(msfp_building *b, double h, double whole)
 {
     const msfp_building_scene *s = &b->scene;
     const size_t n = s->n, r = s->attachments;
@@ -354,12 +365,12 @@ static double building_error(msfp_building *b, double h)
         msfp_add(eu, b->stage_v + j * n, h * b->method.errors[j], s->n);
         msfp_add(ev, b->stage_a + j * n, h * b->method.errors[j], s->n);
     }
-    multiply(s->n, s->mass, ev, 0, y);
+    multiply(s->n, s->mass, ev, y);
+    multiply(s->n, s->stiffness, eu, b->product);
     for (size_t c = 0; c < n; ++c)
-        y[c] /= -beta;
-    multiply(s->n, s->stiffness, eu, 1, y);
+        y[c] = y[c] / -beta + b->product[c];
     pick(b, eu, moved);
-    multiply(s->attachments, b->tangent, moved, 0, b->balance);
+    push(b, moved, b->balance);
     for (size_t k = 0; k < r; ++k)
         y[s->attached[k]] += b->balance[k] / beta;
     for (size_t c = 0; c < n; ++c)
@@ -367,14 +378,12 @@ static double building_error(msfp_building *b, double h)
     solve_linear(b, y);
     pick(b, y, moved);
     solve_tangent(b, moved);
-    multiply(s->attachments, b->tangent, moved, 0, b->balance);
-    for (size_t k = 0; k < r; ++k)
-        for (size_t c = 0; c < n; ++c)
-            y[c] -= b->now->follow[k * n + c] * b->balance[k];
+    push(b, moved, b->balance);
+    follow_back(b, b->balance, y);
     for (size_t c = 0; c < n; ++c)
         eu[c] += beta * y[c];
-    const double wrong = energy_of(b, eu, y, ev);
-    const double whole = energy_of(b, b->next_u, b->stage_v + last * n, ev);
+    double of_error[2];
+    const double wrong = energies_of(b, eu, y, ev, of_error);
     return sqrt(wrong / fmax(b->energy, whole)) / s->rtol;
 }
 
@@ -386,6 +395,7 @@ static int prepare_tangent(msfp_building *b, double beta)
         return MSFP_OK;
     for (size_t i = 0; i < count && beta != b->tangent_beta; ++i)
         b->tangent[i] *= beta / b->tangent_beta;
+    b->factored_beta = beta == b->tangent_beta ? b->factored_beta : 0.0;
     b->tangent_beta = beta;
     return factor_tangent(b);
 }
@@ -431,7 +441,9 @@ int try_step(msfp_building *b, double h, double *error, double *share, int *wors
     if ((status = first_failure(b)))
         return status;
     *worst = 0;
-    *error = b->tangent_beta > 0.0 ? building_error(b, h) : 0.0;
+    const double whole =
+        energies_of(b, b->next_u, b->stage_v + (size_t)(b->method.count - 1) * n, b->product, b->next_energies);
+    *error = b->tangent_beta > 0.0 ? building_error(b, h, whole) : 0.0;
     *share = 1.0;
     for (int i = 0; i < b->scene.bearings; ++i) {
         if (b->members[i].error > *error) {

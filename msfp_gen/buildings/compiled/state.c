@@ -219,6 +219,7 @@ int msfp_building_snapshot_read(msfp_building *b, const void *snapshot, size_t s
     if (room_for(b, head[2]))
         return MSFP_E_MEMORY;
     pass_state(b, &t);
+    b->factored_beta = 0.0;
     for (int i = 0; i < b->scene.bearings; ++i) {
         const msfp_part *part = &b->scene.parts[i];
         const size_t own = part->api->port_snapshot_size(part->port);
