@@ -403,19 +403,20 @@ class SceneFactory:
 
     def __init__(self, recipe: Recipe) -> None:
         self.recipe = recipe
+        self._changed = {path.partition(".")[0] for axis in recipe.axes for path in axis.paths}
         self._fidelity = recipe.scene.get("fidelity", "exact")
         base = {key: value for key, value in recipe.scene.items() if key != "fidelity"}
         self.base = scene_of(base)
         at_fidelity(self.base, self._fidelity)  # raises its errors
+        self._check_motions(self.base)
         self._set_paths = sorted(  # (depth, index of the axis, path): a table is set before its fields
             (len(keys_of(path)), index, path)
             for index, axis in enumerate(recipe.axes)
             for path in axis.paths
             if axis.change == "sets"
         )
-        changed = {path.partition(".")[0] for axis in recipe.axes for path in axis.paths}
         self._fixed: Table = {}  # parts of every scene that are read already
-        if not recipe.records and "motion" not in changed:
+        if not recipe.records and "motion" not in self._changed:
             self._fixed["motion"] = self.base.motion
             if hasattr(self.base, "motion_table"):
                 self._fixed["motion_table"] = self.base.motion_table
@@ -438,8 +439,24 @@ class SceneFactory:
         for axis, value in pairs:
             if axis.change == "factors":
                 scene = bounded_scene(scene, self.recipe.factors[axis.paths[0]], value)
+        self._check_motions(scene)
         reduced: System = at_fidelity(scene, level)
         return reduced
+
+    def _check_motions(self, scene: System) -> None:
+        """Raise InputError where bearings of a building have motions of their own, which the study does not change."""
+        mounts = getattr(scene, "bearings", ())
+        own = [index for index, mount in enumerate(mounts) if mount.motion is not None]
+        if own and self.recipe.records:
+            what = "records and their scales give the motion of the scene"
+        elif own and len(own) == len(mounts) and "motion" in self._changed:
+            what = "no bearing is left on the motion of the scene, which the study changes"
+        else:
+            return
+        raise InputError(
+            f"building.bearing[{own[0]}].motion: this bearing has a motion of its own, and {what}; leave the motions "
+            "of bearings out, or vary them by their paths"
+        )
 
     def _scaled(self, name: str, factor: float) -> Table:
         """The `[motion]` table of a record times a factor."""
