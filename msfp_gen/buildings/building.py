@@ -108,7 +108,7 @@ class Building:
     ) -> Building:
         """A frame of rigid floors on columns, with its base on the bearings; see `BaseSlab` and `Storey`.
 
-        Bearings are attached to the node "base", at any position in plan.
+        Bearings are attached to the node "base", at any position in plan. The node of a floor is its centre of mass.
 
         damping_ratio: of the modes on a fixed base: one number for all modes, or one for each mode from the lowest.
         rayleigh_frequencies: two frequencies at which Rayleigh damping has the damping ratio, then one number [Hz].
@@ -237,7 +237,7 @@ class Building:
         modes = np.zeros((len(self.mass), int(low.sum())))
         modes[fixed.inner] = fixed.modes[:, low]
         basis = np.hstack([self._static, modes])
-        nodes = tuple(Node(node.name, node.position, node.rows @ basis, node.carries) for node in self.nodes)
+        nodes = tuple(replace(node, rows=node.rows @ basis) for node in self.nodes)
         columns = tuple(
             Columns(column.name, column.deformation @ basis, column.inertia @ basis) for column in self.columns
         )

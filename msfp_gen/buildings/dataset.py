@@ -15,6 +15,7 @@ from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.extremes import DIMENSIONS, OF_SURFACES, SIZES, BuildingExtremes
 from msfp_gen.buildings.file import stored_bearing
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.buildings.spectra import Steps
 from msfp_gen.buildings.storey import FREEDOMS, Columns, Node
 from msfp_gen.common.arrays import Array
 from msfp_gen.motions.motion import Motion
@@ -66,7 +67,7 @@ def scene_text(scene: BuildingScene) -> str:
             "solver": plain_table(scene.solver),
             "limits": None if scene.limits is None else plain_table(scene.limits),
             "fidelity": None if scene.fidelity == "exact" else scene.fidelity,
-            "node": [{"name": n.name, "carries": n.carries} for n in building.nodes],
+            "node": [{"name": n.name, "carries": n.carries, "floor": n.floor} for n in building.nodes],
             "column": [{"name": column.name} for column in building.columns],
             "bearing": [
                 {
@@ -105,7 +106,10 @@ def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -
     """The scene of a text of `scene_text`, arrays of `to_arrays` and all motions of the ground. Raises InputError."""
     table = toml_table(text)
     of_nodes = zip(table.get("node", []), arrays["node_position"], arrays["node_rows"], strict=True)
-    nodes = tuple(Node(str(row["name"]), position, rows, bool(row["carries"])) for row, position, rows in of_nodes)
+    nodes = tuple(
+        Node(str(row["name"]), position, rows, bool(row["carries"]), bool(row["floor"]))
+        for row, position, rows in of_nodes
+    )
     of_storeys = zip(table.get("column", []), arrays["deformation"], arrays["inertia"], strict=True)
     columns = tuple(Columns(str(row["name"]), deformation, inertia) for row, deformation, inertia in of_storeys)
     building = Building(arrays["mass"], arrays["damping"], arrays["stiffness"], nodes, columns)
@@ -123,6 +127,8 @@ def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -
 
 
 EXTREMES = "extremes"  # group
+STEPS = "steps"  # group with the accelerations of all nodes at the ends of all steps
+OF_STEPS = {"time": ("step",), "acceleration": ("step", "node", "freedom")}
 FREEDOM = ("u1", "u2", "u3", "r1", "r2", "r3")
 ON_BEARING = "on the bearing"
 MOTION_UNITS = {  # unit of translations; unit of translations and rotations in one array
@@ -192,7 +198,7 @@ STORED = {
 FORCE = "force and moment that accelerate the floors above, at half height"
 # Variables that follow from STORED.
 DERIVED = {
-    **_motions("node", ("time", "node", "freedom"), "{} of the node, absolute", 1),
+    **_motions("node", ("time", "node", "freedom"), "{} of the node, of a floor its centre of mass, absolute", 1),
     "bearing_displacement": _of_bearings("displacement", "bearing_displacement", "base less top"),
     "top_force": _of_bearings("top_force", "top_force", "on the building"),
     "axial_force": Variable(
@@ -209,6 +215,7 @@ DERIVED = {
     "storey_force": Variable(STOREYS, "N or N m", FORCE, "storey_force", sign="on the floors above"),
     "energy_kinetic": Variable(ALL, "J", "kinetic energy of the building", "kinetic"),
     "energy_strain": Variable(ALL, "J", "strain energy of the building", "strain"),
+    "energy_potential": Variable(ALL, "J", "potential energy of the weights, from the place at rest", "potential"),
 }
 VARIABLES = STORED | DERIVED
 
@@ -273,6 +280,7 @@ def groups_of(result: Any) -> dict[str, xr.Dataset]:
     """The groups of a file beside the dataset: matrices, motions of the ground, extremes."""
     groups = {GROUP: _group_of(to_arrays(result.scene.building), MATRICES)}
     groups |= {ground_name(i): to_pieces(motion) for i, motion in enumerate(result.scene.grounds[0])}
+    groups |= {STEPS: _group_of(result.steps._asdict(), OF_STEPS)}
     return groups | {EXTREMES: _group_of(vars(result.extremes), DIMENSIONS)}
 
 
@@ -290,7 +298,7 @@ def _arrays_in(root: StoredGroup, name: str, dims: Dimensions, sizes: Mapping[st
 
 def edition() -> str:
     """A digest of the names of variables and extremes in a file of this version."""
-    return digest_of_names([*STORED, *DIMENSIONS])
+    return digest_of_names([*STORED, *OF_STEPS, *DIMENSIONS])
 
 
 def fields_in(root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, Any]:
@@ -306,6 +314,7 @@ def fields_in(root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, An
     return {
         "scene": scene,
         **stored_fields(root, STORED, sizes, missing),
+        "steps": Steps(**_arrays_in(root, STEPS, OF_STEPS, sizes | {"step": root.group(STEPS).rows("time")})),
         "wall_time": counters.pop("wall_time"),
         "counters": counters,
         "monitored": notes_in(about),

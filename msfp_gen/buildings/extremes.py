@@ -37,8 +37,10 @@ class BuildingExtremes:
     """Extremes of the run of a building.
 
     Vectors, shape (..., 4), with the largest magnitudes along E1, E2, E3 and in the horizontal plane: node_acceleration
-    [m/s^2]; node_displacement, relative to the ground, drift of the storeys at the stiffness centre, corner_drift at
-    the corner of the plan with the largest drift, and mean_displacement of the bearings [m]; overturning_moment, about
+    [m/s^2] and node_displacement relative to the ground [m], of a floor at its centre of mass; corner_acceleration and
+    corner_displacement, the largest at the corners of the plan on this floor (where the node is no floor, of the node);
+    drift of the storeys at the stiffness centre, corner_drift, the largest at the corners of the plan, and
+    mean_displacement of the bearings [m]; overturning_moment, about
     E1 and E2 [N m]; storey_shear, base_reaction and top_force of the bearings [N]; bearing_displacement, base less top
     [m].
 
@@ -54,6 +56,8 @@ class BuildingExtremes:
 
     node_acceleration: OfNodes
     node_displacement: OfNodes
+    corner_acceleration: OfNodes
+    corner_displacement: OfNodes
     drift: OfStoreys
     corner_drift: OfStoreys
     storey_shear: OfStoreys
@@ -79,6 +83,7 @@ class BuildingExtremes:
     def of_run(cls, scene: BuildingScene, recorded: Array, kept: Sequence[Shapes]) -> BuildingExtremes:
         """Extremes from the numbers of a compiled run (`msfp_building.h`). kept: names and shapes for each bearing."""
         nodes, storeys = len(scene.building.nodes), len(scene.building.columns)
+        floors = np.array([node.floor for node in scene.building.nodes], dtype=bool)
         vectors = {
             "node_acceleration": nodes,
             "node_displacement": nodes,
@@ -89,6 +94,8 @@ class BuildingExtremes:
             "mean": 1,
             "overturning": 1,
             "corner": CORNERS * storeys,
+            "floor_acceleration": CORNERS * int(floors.sum()),
+            "floor_displacement": CORNERS * int(floors.sum()),
             "base": 1,
         }
         shapes: Shapes = [(name, (count, VECTOR)) for name, count in vectors.items()]
@@ -102,11 +109,18 @@ class BuildingExtremes:
         def of_bearings(name: str) -> list[Array]:
             return [values[f"{name} {i}"] for i in range(len(kept))]
 
+        def of_corners(name: str) -> Array:
+            found: Array = values[f"node_{name}"].copy()
+            found[floors] = values[f"floor_{name}"].reshape(-1, CORNERS, VECTOR).max(axis=1)
+            return found
+
         radii = [bearing.arrays()["radius"] for bearing in scene.every_bearing]
         return cls(
             **{name: values[name] for name in list(vectors)[:4]},
             storey_torsion=values["torsion"][:, 2],
             base_twist=values["twist"][:, 2],
+            corner_acceleration=of_corners("acceleration"),
+            corner_displacement=of_corners("displacement"),
             corner_drift=values["corner"].reshape(storeys, CORNERS, VECTOR).max(axis=1),
             mean_displacement=values["mean"][0],
             overturning_moment=values["overturning"][0],
@@ -158,6 +172,11 @@ def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:
     entries.append((0, scene.attachments[:, :3].mean(axis=0), mean))
     entries.append((2, np.vstack([overturning(scene), zeros[:1]]), none))
     entries += [(0, rows, none) for rows in corners(scene).reshape(-1, 3, size)]
+    of_floors = [
+        node.linked(point)[:3] for node in building.nodes if node.floor for point in corner_points(scene, node.position)
+    ]
+    entries += [(2, rows, none) for rows in of_floors]
+    entries += [(0, rows, first) for rows in of_floors]
     orders, rows, shares = zip(*entries, strict=True)
     return list(orders), np.stack(rows), np.stack(shares)
 
@@ -176,14 +195,22 @@ def overturning(scene: BuildingScene) -> Array:
 def corners(scene: BuildingScene) -> Array:
     """Rows of the drift of each storey at the corners of the rectangle around the bearings, (storeys, 4, 3, n) [SI]."""
     nodes, size = scene.building.nodes, len(scene.building.mass)
-    (west, south), (east, north) = scene.places.min(axis=0), scene.places.max(axis=0)
     rows = [
         above.linked(point)[:3] - below.linked(point)[:3]
         for below, above, _ in zip(nodes, nodes[1:], scene.building.columns, strict=False)
-        for x, y in ((west, south), (east, south), (east, north), (west, north))
-        for point in [np.array([x, y, (below.position[2] + above.position[2]) / 2])]
+        for point in corner_points(scene, (below.position + above.position) / 2)
     ]
     return np.reshape(rows, (-1, CORNERS, 3, size))
+
+
+def corner_points(scene: BuildingScene, position: Array) -> Array:
+    """Corners of the plan at the height of a position [m]: of the rectangle around the bearings, shape (4, 3) [m].
+
+    They are counterclockwise from the corner with the least coordinates.
+    """
+    (west, south), (east, north) = scene.places.min(axis=0), scene.places.max(axis=0)
+    plan = [(west, south), (east, south), (east, north), (west, north)]
+    return np.array([[*corner, position[2]] for corner in plan])
 
 
 def lift_of(compression: Array) -> Array:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +29,6 @@ from msfp_gen.figures.style import (
     subscript,
 )
 from msfp_gen.motions.records.spectrum import response_spectrum
-from msfp_gen.results.joining import interpolated
 from msfp_gen.results.sign import shown_sign
 
 if TYPE_CHECKING:
@@ -41,8 +39,6 @@ if TYPE_CHECKING:
 ORBIT = 0.42  # radius of the largest orbit in the plan, over the least distance of two bearings
 ROUND = (1, 2, 5)  # magnifications are these times a power of ten
 LABELLED = 24  # bearings of a plan that are labelled, at most
-PERIODS = np.geomspace(0.03, 5.0, 120)  # of floor spectra [s]
-DAMPING = 0.05  # of floor spectra
 G = 9.80665  # of accelerations in figures [m/s^2]
 AXES = range(3)
 
@@ -64,12 +60,17 @@ def plot_profile(result: BuildingResult, path: str | Path | None = None) -> Figu
 
 
 def plot_floor_spectra(result: BuildingResult, path: str | Path | None = None) -> Figure:
-    """Response spectra of the accelerations of all floors and of the ground, 5 % damping, along E1, E2 and E3."""
-    names = [node.name for node in result.scene.building.nodes]
-    spectra = {"ground": _spectrum(result.time, result.ground[:, 2])}
-    spectra |= {name: _spectrum(result.time, result.node(name)[:, 2, :3]) for name in names}
+    """Response spectra of the accelerations of all floors and of the ground, 5 % damping, along E1, E2 and E3.
+
+    Of a rigid floor at its centre of mass, and dotted the largest at the corners of the plan.
+    """
+    found = result.floor_spectra()
+    spectra = {"ground": response_spectrum(result.scene.motion, found.periods, damping=found.damping).psa[:, :3]}
+    spectra |= dict(zip(found.names, found.nodes, strict=True))
+    corners = dict(zip(found.names, found.corners, strict=True)) if has_floors(result) else {}
     with page(11.5, 4.6, path) as figure:
-        headline(figure, f"{title_of(result)}: floor spectra, {100 * DAMPING:g} % damping")
+        dotted = ", at centres of mass; dotted: largest at the corners of the plan" if corners else " at nodes"
+        headline(figure, f"{title_of(result)}: floor spectra, {100 * found.damping:g} % damping{dotted}")
         row = panels(figure, *(f"along E{subscript(axis + 1)}" for axis in AXES))
         for axis, axes in zip(AXES, row, strict=True):
             for index, (name, values) in enumerate(spectra.items()):
@@ -78,11 +79,13 @@ def plot_floor_spectra(result: BuildingResult, path: str | Path | None = None) -
                     if name == "ground"
                     else {"color": COLOURS[(index - 1) % len(COLOURS)]}
                 )
-                axes.plot(PERIODS, values[:, axis] / G, label=plain(name), **style)
+                axes.plot(found.periods, values[:, axis] / G, label=plain(name), **style)
+                if name in corners:
+                    axes.plot(found.periods, corners[name][:, axis] / G, **style, linestyle=":", linewidth=THIN)
             axes.set(
                 xscale="log", xlabel="period T [s]", ylabel=f"pseudo-acceleration along E{subscript(axis + 1)} [g]"
             )
-            axes.set_xlim(PERIODS[0], PERIODS[-1])
+            axes.set_xlim(found.periods[0], found.periods[-1])
             axes.set_ylim(bottom=0.0)
             axes.set_xticks([0.05, 0.1, 0.2, 0.5, 1, 2, 5], ["0.05", "0.1", "0.2", "0.5", "1", "2", "5"])
             axes.minorticks_off()
@@ -146,36 +149,58 @@ def draw_plan(axes: Axes, result: BuildingResult) -> None:
     axes.legend(loc="upper right", bbox_to_anchor=(1.0, -0.06), borderaxespad=0.0)
 
 
-PROFILES = ("Peak floor acceleration", "Peak drift of the storeys", "Peak storey shear over the weight")
+PROFILES = ("Peak floor acceleration", "Peak storey drift", "Peak storey shear over the weight")
 
 
 def draw_profile(row: list[Axes], result: BuildingResult) -> None:
-    """Three panels over the height: accelerations of floors, drift ratios and shears of storeys, along E1 and E2."""
+    """Three panels over the height: accelerations of floors, drift ratios and shears of storeys, along E1 and E2.
+
+    Accelerations are at the centres of mass, drifts at the stiffness centres; dotted: largest at the corners.
+    """
     floors, storeys = result.floors, result.storeys
-    heights = [floor["height"] for floor in floors]
+    heights, corners = [floor["height"] for floor in floors], has_floors(result)
     ground = np.abs(result.ground[:, 2]).max(axis=0)
     for axis in AXES:
         key, colour = f"E{axis + 1}", COLOURS[axis]
         peaks = [floor["peak_acceleration"][key] / G for floor in floors]
         row[0].plot(peaks, heights, marker="o", markersize=4, color=colour, label=f"E{subscript(axis + 1)}")
+        if corners:
+            peaks = [floor["peak_corner_acceleration"][key] / G for floor in floors]
+            row[0].plot(peaks, heights, color=colour, linestyle=":")
         row[0].plot(ground[axis] / G, heights[0], marker="x", color=colour, linestyle="none")
         if axis < 2 and storeys:
             drifts = [100 * storey["peak_drift"][key] / storey["height"] for storey in storeys]
             shears = [storey["peak_shear"][key] / result.scene.weight for storey in storeys]
             base = result.summary["peak_force"][key] / result.scene.weight
-            for axes, values in ((row[1], drifts), (row[2], shears)):
-                axes.stairs(values, heights[: len(values) + 1], orientation="horizontal", color=colour, linewidth=LINE)
+            at_corners = [100 * storey["peak_corner_drift"][key] / storey["height"] for storey in storeys]
+            for axes, values, line in ((row[1], drifts, "-"), (row[1], at_corners, ":"), (row[2], shears, "-")):
+                axes.stairs(
+                    values,
+                    heights[: len(values) + 1],
+                    orientation="horizontal",
+                    color=colour,
+                    linewidth=LINE,
+                    linestyle=line,
+                )
             row[2].plot(base, heights[0], marker="x", color=colour, linestyle="none")
     row[0].plot([], [], marker="x", color=FAINT, linestyle="none", label="ground")
+    for axes in row[: 2 if storeys else 1] if corners else ():
+        axes.plot([], [], color=FAINT, linestyle=":", label="corners of the plan")
     row[2].plot([], [], marker="x", color=FAINT, linestyle="none", label="below the bearings")
-    row[0].set(xlabel="acceleration [g]", ylabel="height z [m]")
-    row[1].set_xlabel("drift over the height of the storey [%]")
+    where = "at centres of mass" if corners else "at nodes"
+    row[0].set(xlabel=f"acceleration {where} [g]", ylabel="height z [m]")
+    row[1].set_xlabel("drift at stiffness centres over height [%]")
     row[2].set_xlabel("shear V / W [-]")
-    row[0].legend(loc="best")
-    row[2].legend(loc="best")
+    for axes in row if storeys else row[::2]:
+        axes.legend(loc="best")
     for axes in row:
         axes.set_xlim(left=0.0)
         axes.set_yticks(heights, [f"{floor['name']}\n{floor['height']:g}" for floor in floors])
+
+
+def has_floors(result: BuildingResult) -> bool:
+    """Whether nodes are centres of mass of rigid floors, which have corners."""
+    return any(node.floor for node in result.scene.building.nodes)
 
 
 def draw_axial_history(axes: Axes, result: BuildingResult) -> None:
@@ -229,19 +254,6 @@ def magnification(places: Array, peak: float) -> float:
     wanted = ORBIT * (apart if np.isfinite(apart) else 1.0) / peak if peak > 0 else 1.0
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(power * max(number for number in ROUND if number * power <= wanted * (1 + 1e-9)))
-
-
-def _spectrum(time: Array, values: Array) -> Array:
-    """Pseudo-accelerations along E1, E2, E3, shape (p, 3) [m/s^2]."""
-    if len(time) < 2:  # of a run that ended at its start
-        return np.zeros((len(PERIODS), 3))
-    floor: Any = SimpleNamespace(
-        max_step=2 * float(np.diff(time).min()),
-        duration=float(time[-1]),
-        acceleration=partial(interpolated, time, values),
-    )
-    psa: Array = response_spectrum(floor, PERIODS, damping=DAMPING).psa[:, :3]
-    return psa
 
 
 EDGE = 0.06  # of a floor beyond the outermost bearings, over the size of the plan

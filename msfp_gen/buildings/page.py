@@ -22,9 +22,13 @@ TERMS = (
     ("N", "compression between a bearing and the building; at rest its share of the weight. Where it falls to zero, "
      "the bearing would lift off."),
     ("base shear", "horizontal force of the ground on all bearings."),
-    ("drift", "horizontal displacement of a floor relative to that below, tilt of the floors taken out."),
+    ("floor acceleration", "of the centre of mass of a floor; at corners: the largest at the corners of the plan, the "
+     "rectangle around the bearings."),
+    ("drift", "horizontal displacement of a floor relative to that below, tilt of the floors taken out; at the "
+     "stiffness centre of the storey, or at the corners of the plan."),
     ("storey shear", "force that accelerates the floors above."),
-    ("floor spectrum", "largest response of oscillators of a period that stand on a floor, with 5 % damping."),
+    ("floor spectrum", "largest response of oscillators of a period that stand on a floor, at its centre of mass or "
+     "the corners of the plan, with 5 % damping."),
     ("left", "capacity of a surface less its sliding: what remains until the slider meets the rim of its dish."),
     ("rim", "the raised edge of a dish. Inner sliders of a triple pendulum meet theirs in strong motion."),
 )  # fmt: skip

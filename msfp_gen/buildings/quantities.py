@@ -5,17 +5,27 @@ from __future__ import annotations
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.results.quantities import RUN, Quantity, Source, sources_of
 
-_RUN = RUN | {"rims_met": RUN["rims_met"]._replace(kept=False)}
+_RUN = RUN | {
+    "rims_met": RUN["rims_met"]._replace(kept=False),
+    "peak_force": RUN["peak_force"]._replace(words="peak base shear"),
+    "peak_force_ratio": RUN["peak_force_ratio"]._replace(words="peak base shear over the weight"),
+}
+AT_CORNERS = "peak floor acceleration at corners"
 QUANTITIES = _RUN | {
     "peak_base_torsion": Quantity("N m", "peak_base_torsion", extreme="most"),
     "peak_overturning_moment": Quantity("N m", "peak_overturning_moment.radial", "most"),
     "peak_floor_acceleration": Quantity("m/s^2", "peak_floor_acceleration.radial", "most", kept=True),
     "peak_vertical_acceleration": Quantity("m/s^2", "peak_floor_acceleration.E3", extreme="most"),
+    "peak_corner_acceleration": Quantity("m/s^2", "peak_corner_acceleration.radial", "most", words=AT_CORNERS),
+    "peak_corner_vertical_acceleration": Quantity("m/s^2", "peak_corner_acceleration.E3", extreme="most"),
     "peak_drift_ratio": Quantity("", "peak_drift_ratio", "most", kept=True),
-    "peak_corner_drift_ratio": Quantity("", "peak_corner_drift_ratio", "most"),
+    "peak_corner_drift_ratio": Quantity("", "peak_corner_drift_ratio", "most", words="peak drift ratio at corners"),
     "minimum_load_ratio": Quantity("", "minimum_load_ratio", "least", kept=True),
     "maximum_load_ratio": Quantity("", "maximum_load_ratio", "most"),
     "floor_acceleration": Quantity("m/s^2", "floors.*.peak_acceleration.radial", "most", of_parts=True),
+    "floor_corner_acceleration": Quantity(
+        "m/s^2", "floors.*.peak_corner_acceleration.radial", "most", of_parts=True, words="acceleration at corners"
+    ),
     "storey_drift_ratio": Quantity("", "storeys.*.peak_drift_ratio", "most", of_parts=True),
     "storey_corner_drift_ratio": Quantity("", "storeys.*.peak_corner_drift_ratio", "most", of_parts=True),
     "storey_shear": Quantity("N", "storeys.*.peak_shear.radial", "most", of_parts=True),

@@ -8,12 +8,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from msfp_gen.buildings import dataset as building_dataset
 from msfp_gen.buildings import summary as summaries
 from msfp_gen.buildings.extremes import CONTACT, OF_SURFACES, BuildingExtremes, corners, heated, overturning
 from msfp_gen.buildings.notes import notes_of
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.buildings.spectra import FloorSpectra, Steps, floor_spectra
 from msfp_gen.buildings.summary import BuildingCharacterisation
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
@@ -50,10 +52,12 @@ class BuildingResult(AnyResult):
         sliding, lift: sliding and clearance between separated faces, shape as of normal_force [m].
         temperature: of the surfaces, of the start where a model has none, shape as of normal_force [degC].
         dissipated: in each bearing, shape (k, bearings) [J].
+        interface_dissipated: by the dampers of each interface, shape (k, bearings) [J].
         stored: in each bearing and the springs of its interface, shape (k, bearings) [J].
         damped: by the damping of the building, shape (k,) [J].
         received: work of the bearings on the building, by their forces beyond the loads at rest, shape (k,) [J].
         input: work of the ground, shape (k,) [J].
+        steps: accelerations of the nodes at the start and the ends of all steps, whatever the times of the rows.
         counters: work of the solver.
         monitored: notes of the monitors of the bearings, each with the number of its bearing.
         extremes: over all steps.
@@ -78,11 +82,13 @@ class BuildingResult(AnyResult):
     lift: Array
     temperature: Array
     dissipated: Array
+    interface_dissipated: Array
     stored: Array
     damped: Array
     received: Array
     input: Array
     support: Array
+    steps: Steps
     counters: dict[str, int]
     extremes: BuildingExtremes
     monitored: tuple[Note, ...] = ()
@@ -171,6 +177,16 @@ class BuildingResult(AnyResult):
         """Energy of deformation of the building, from the place at rest, shape (k,) [J]."""
         return 0.5 * _squares(self.displacement, self.scene.building.stiffness)
 
+    @property
+    def potential(self) -> Array:
+        """Potential energy of the weights, from the position at rest, shape (k,) [J].
+
+        The work against the loads of the bearings at rest, which carry weights and static strains.
+        """
+        raised = self.displacement @ self.scene.attachments[:, 2].T
+        energy: Array = raised @ self.scene.axial_loads
+        return energy
+
     def _of_storeys(self, name: str, motion: Array) -> Array:
         """The rows `name` of the columns of every storey times a motion, shape (k, storeys, 6) [SI]."""
         columns = self.scene.building.columns
@@ -206,32 +222,49 @@ class BuildingResult(AnyResult):
         - peak_base_torsion: about E3 through the centre of mass [N m]. peak_twist: of the base about E3 [rad].
         - peak_overturning_moment: about E1 and E2 through the centre of mass, and radial [N m].
         - minimum_load_ratio, maximum_load_ratio: axial force of any bearing over its load at rest [-].
-        - peak_floor_acceleration: of any node [m/s^2]. peak_drift_ratio: of any storey;
-          peak_corner_drift_ratio: at its corners [-].
-        - floors: for each node name, height [m], peak_acceleration [m/s^2], peak_displacement relative to the ground
-          [m].
+        - peak_floor_acceleration: of any node, of floors at their centres of mass; peak_corner_acceleration: at the
+          corners of the plan on any floor [m/s^2]. peak_drift_ratio: of any storey at its stiffness centre;
+          peak_corner_drift_ratio: at the corners of the plan [-].
+        - floors: for each node name, height [m], place in plan [m], floor (whether it is the centre of mass of a rigid
+          floor), peak_acceleration [m/s^2] and peak_displacement relative to the ground [m] there, and the largest at
+          the corners of the plan, peak_corner_acceleration and peak_corner_displacement.
         - storeys: for each storey name, height [m], peak_drift [m] and peak_drift_ratio [-] at the stiffness centre,
           peak_corner_drift [m] and peak_corner_drift_ratio [-] at the corners of the rectangle around the bearings,
           peak_shear [N], peak_torsion [N m].
         - bearings: see `BearingResult.summary`.
-        - energy: largest kinetic and strain energy of the building; damped by the building and dissipated by the
-          bearings at the end [J]; closure_error of the balance of the building [-].
+        - energy: largest kinetic and strain energy of the building; at the end input, the work of the ground, damped by
+          the building, dissipated by the bearings and interface_dissipated by their interfaces [J]; closure_error of
+          the balance of the building [-].
         """
         return summaries.summarise(self)
 
     @property
     def floors(self) -> list[dict[str, Any]]:
         """Peaks of every node, as in the summary."""
-        peaks = (self.extremes.node_acceleration, self.extremes.node_displacement)
+        peaks = {
+            "peak_acceleration": self.extremes.node_acceleration,
+            "peak_displacement": self.extremes.node_displacement,
+            "peak_corner_acceleration": self.extremes.corner_acceleration,
+            "peak_corner_displacement": self.extremes.corner_displacement,
+        }
         return [
             {
                 "name": node.name,
                 "height": float(node.position[2]),
-                "peak_acceleration": by_axis(acceleration),
-                "peak_displacement": by_axis(displacement),
+                "place": node.position[:2].tolist(),
+                "floor": node.floor,
+                **{name: by_axis(values[index]) for name, values in peaks.items()},
             }
-            for node, acceleration, displacement in zip(self.scene.building.nodes, *peaks, strict=True)
+            for index, node in enumerate(self.scene.building.nodes)
         ]
+
+    def floor_spectra(self, periods: ArrayLike | None = None, damping: float = 0.05) -> FloorSpectra:
+        """Spectra of the accelerations of all floors, from the ends of all steps, whatever the times of the rows.
+
+        periods: shape (p,) [s]; None: 120 from 0.03 to 5 s. damping: ratio to the critical damping [-]. Raises
+        InputError.
+        """
+        return floor_spectra(self, periods, damping)
 
     @property
     def storeys(self) -> list[dict[str, Any]]:
@@ -257,16 +290,12 @@ class BuildingResult(AnyResult):
     def main_results(self) -> Rows:
         """Label and value of the main results."""
         s = self.summary
-        displacement, force, acceleration = s["peak_displacement"], s["peak_force"], s["peak_floor_acceleration"]
-        drift = "" if s["peak_drift_ratio"] is None else f", drift {100 * s['peak_drift_ratio']:.3g} % of the height"
+        displacement, force = s["peak_displacement"], s["peak_force"]
         return [
             time_row(s),
             ("bearings", f"{len(self.bearings)}, peak displacement {1e3 * displacement['radial']:.4g} mm"),
             ("base shear", f"{1e-6 * force['radial']:.4g} MN ({s['peak_force_ratio']:.3f} of the weight)"),
-            (
-                "floors",
-                f"peak acceleration {acceleration['radial']:.4g} m/s^2, vertical {acceleration['E3']:.4g}{drift}",
-            ),
+            *summaries.floor_rows(s),
             ("N over N at rest", summaries.ratios_text(s)),
             ("rims met", summaries.rims_text(s["bearings"])),
         ]
@@ -417,7 +446,7 @@ class BearingResult(OneBearing):
         Keys of any bearing: see `Result.summary`; axial_load is at rest [N]. Other keys: number (from 1), name, layout,
         position in plan [m]; minimum_load_ratio and maximum_load_ratio: axial force over the load at rest, 0 where the
         bearing lifts [-]; displacement_used: peak displacement over that at which all rims are met [-];
-        dissipated: at the end [J].
+        dissipated, and by its interface interface_dissipated: at the end [J].
         """
         least, most = self.building.extremes.axial_force[self.index] / self.axial_load
         return {
@@ -430,7 +459,7 @@ class BearingResult(OneBearing):
             "minimum_load_ratio": max(float(least), 0.0),  # below 0 its top plate hangs from the building
             "maximum_load_ratio": float(most),
             "verdict": self.verdict.as_dict,
-            "dissipated": float(self.history.dissipated[-1]),
+            **{name: float(self.history.energy[name][-1]) for name in ("dissipated", "interface_dissipated")},
         }
 
     def main_results(self) -> Rows:

@@ -47,9 +47,10 @@ class BuildingBearing:
     """A bearing of a building.
 
     bearing: values, which several bearings of a building may share. interface: `Top.node(...)`, stiffness and damping
-    between top plate and building. position: in plan [m]; None: of the node. node: of the building; a rigid link
-    connects the bearing to it. effects: of the model; `Auto` or None: selected from the scene. name: for messages and
-    results. motion: of the ground below the bearing; None: of the scene. Raises InputError.
+    between top plate and building. position: in plan [m]; None: of the node, of a floor its centre of mass. node: of
+    the building; a rigid link connects the bearing to it. effects: of the model; `Auto` or None: selected from the
+    scene. name: for messages and results. motion: of the ground below the bearing; None: of the scene. Raises
+    InputError.
     """
 
     bearing: Bearing

@@ -29,13 +29,15 @@ class Node:
 
     name: a label. position: in plan, and height above the nodes of the bearings, ndarray, shape (3,), [m]. rows:
     ndarray, shape (6, n); times the n coordinates of the building they are displacements [m] and rotations [rad] of the
-    node. carries: whether bearings may be attached to the node.
+    node. carries: whether bearings may be attached to the node. floor: whether it is the centre of mass of a rigid
+    floor, which has corners.
     """
 
     name: str
     position: Array
     rows: Array
     carries: bool = False
+    floor: bool = False
 
     def linked(self, position: ArrayLike) -> Array:
         """Rows, as of a node, of a point that a rigid link connects to the node, shape (6, n) [SI]. position: [m]."""
@@ -134,7 +136,7 @@ class Columns(NamedTuple):
 def frame(base: BaseSlab, storeys: Sequence[Storey]) -> tuple[Array, Array, tuple[Node, ...], tuple[Columns, ...]]:
     """Mass and stiffness of an undamped frame, both shape (n, n) [SI], its floors from the base upwards, and columns.
 
-    The coordinates are motions of the floors at the origin of the plan.
+    The coordinates are motions of the floors at the origin of the plan; the nodes are at their centres of mass.
     """
     nodes = _floors(storeys)
     floors: list[BaseSlab | Storey] = [base, *storeys]
@@ -144,7 +146,13 @@ def frame(base: BaseSlab, storeys: Sequence[Storey]) -> tuple[Array, Array, tupl
     stiffness = np.zeros_like(mass)
     for storey, column in zip(storeys, columns, strict=True):
         stiffness += column.deformation.T * storey.springs @ column.deformation
-    return mass, stiffness, nodes, columns
+    return mass, stiffness, tuple(map(_at_mass_centre, nodes, floors)), columns
+
+
+def _at_mass_centre(node: Node, floor: BaseSlab | Storey) -> Node:
+    """The node of a floor at its centre of mass. node: at the origin of the plan."""
+    position = np.array([*floor.mass_centre, node.position[2]])
+    return replace(node, position=position, rows=node.linked(position), floor=True)
 
 
 def _inertia(node: Node, floor: BaseSlab | Storey) -> Array:

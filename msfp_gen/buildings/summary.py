@@ -38,6 +38,7 @@ def summarise(result: Any) -> dict[str, Any]:
         "maximum_load_ratio": max(bearing["maximum_load_ratio"] for bearing in bearings),
         "rims_met": [bearing["number"] for bearing in bearings if bearing["rims_met"]],
         "peak_floor_acceleration": _largest([floor["peak_acceleration"] for floor in floors]),
+        "peak_corner_acceleration": _largest([floor["peak_corner_acceleration"] for floor in floors]),
         "peak_drift_ratio": max((storey["peak_drift_ratio"] for storey in storeys), default=None),
         "peak_corner_drift_ratio": max((storey["peak_corner_drift_ratio"] for storey in storeys), default=None),
         "floors": floors,
@@ -48,7 +49,9 @@ def summarise(result: Any) -> dict[str, Any]:
             "peak_kinetic": float(extremes.energy[0]),
             "peak_strain": float(extremes.energy[1]),
             "damped": float(result.damped[-1]),
+            "input": float(result.input[-1]),
             "dissipated": float(result.dissipated[-1].sum()),
+            "interface_dissipated": float(result.interface_dissipated[-1].sum()),
             "closure_error": result.energy_error[0],
         },
     }
@@ -72,11 +75,36 @@ def work_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
     """Tables of the floors, storeys and bearings of a summary, and of bearings that lifted."""
-    floors = _upwards("peaks of floors: absolute acceleration, displacement from the ground", FLOORS, summary["floors"])
-    storeys = [_upwards("peaks of storeys", STOREYS, summary["storeys"])] if summary["storeys"] else []
+    rigid = any(floor["floor"] for floor in summary["floors"])
+    at = f"at {_AT[rigid]}: absolute acceleration, displacement from the ground; a, u: in the plane"
+    at += "; corner: of the plan" * rigid
+    floors = _upwards(f"peaks of floors {at}", NODES | (CORNERS if rigid else {}), summary["floors"])
+    of_storeys = (
+        "peaks of storeys: drift at the stiffness centre, in the plane over the height there and at the corners"
+    )
+    storeys = [_upwards(of_storeys, STOREYS, summary["storeys"])] if summary["storeys"] else []
     bearings = summary["bearings"]
     lifted = [_uplift(bearings)] if any(bearing["uplift"]["count"] for bearing in bearings) else []
     return [floors, *storeys, _bearings(bearings), *lifted]
+
+
+def floor_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Label and value of the largest acceleration of the floors and drift of the storeys."""
+    rigid = any(floor["floor"] for floor in summary["floors"])
+    acceleration = f"peak acceleration at {_AT[rigid]} {_plane_and_vertical(summary['peak_floor_acceleration'])}"
+    acceleration += f"; at corners {_plane_and_vertical(summary['peak_corner_acceleration'])}" if rigid else ""
+    if (drift := summary["peak_drift_ratio"]) is None:
+        return [("floors", acceleration)]
+    drifts = f"peak drift at stiffness centres {100 * drift:.3g} % of the height"
+    drifts += f"; at corners {100 * summary['peak_corner_drift_ratio']:.3g} %"
+    return [("floors", acceleration), ("storeys", drifts)]
+
+
+_AT = {True: "centres of mass", False: "nodes"}
+
+
+def _plane_and_vertical(peak: Mapping[str, float]) -> str:
+    return f"{peak['radial']:.4g} m/s^2, vertical {peak['E3']:.4g}"
 
 
 def rims_text(bearings: Sequence[Mapping[str, Any]]) -> str:
@@ -98,22 +126,30 @@ def _numbers(surfaces: Sequence[int]) -> str:
 
 def _energy(energy: Mapping[str, float]) -> str:
     return (
-        f"bearings dissipate {1e-3 * energy['dissipated']:.4g} kJ, the frame {1e-3 * energy['damped']:.4g} kJ; balance "
-        f"of the frame closes to {energy['closure_error']:.2g}"
+        f"bearings dissipate {1e-3 * energy['dissipated']:.4g} kJ, interfaces "
+        f"{1e-3 * energy['interface_dissipated']:.4g} kJ, the frame {1e-3 * energy['damped']:.4g} kJ; balance of the "
+        f"frame closes to {energy['closure_error']:.2g}"
     )
 
 
 # Column -> (key of a floor, component of its value, scale, format).
-FLOORS: Columns = {
+NODES: Columns = {
     "floor": ("name", "", 1, ""),
     "z [m]": ("height", "", 1, "g"),
     "a1 [m/s^2]": ("peak_acceleration", "E1", 1, ".3f"),
     "a2": ("peak_acceleration", "E2", 1, ".3f"),
     "a3": ("peak_acceleration", "E3", 1, ".3f"),
+    "a": ("peak_acceleration", "radial", 1, ".3f"),
     "u1 [mm]": ("peak_displacement", "E1", 1e3, ".1f"),
     "u2": ("peak_displacement", "E2", 1e3, ".1f"),
+    "u": ("peak_displacement", "radial", 1e3, ".1f"),
 }
-STOREYS: Columns = {  # as FLOORS, of a storey
+CORNERS: Columns = {  # as NODES, at the corners of the plan
+    "corner a": ("peak_corner_acceleration", "radial", 1, ".3f"),
+    "corner a3": ("peak_corner_acceleration", "E3", 1, ".3f"),
+    "corner u": ("peak_corner_displacement", "radial", 1e3, ".1f"),
+}
+STOREYS: Columns = {  # as NODES, of a storey
     "storey": ("name", "", 1, ""),
     "drift 1 [mm]": ("peak_drift", "E1", 1e3, ".2f"),
     "drift 2": ("peak_drift", "E2", 1e3, ".2f"),
@@ -230,8 +266,8 @@ class BuildingCharacterisation(Characterisation):
 
     Attributes:
         secant_period: of the building as a rigid mass on the secant stiffness [s].
-        peak_floor_acceleration: horizontal, of any floor [m/s^2]. peak_drift_ratio: of any storey [-]; None without
-            storeys.
+        peak_floor_acceleration: horizontal, of any floor at its centre of mass [m/s^2]. peak_drift_ratio: of any storey
+            at its stiffness centre [-]; None without storeys.
         bearings: the demand on each bearing.
     """
 
@@ -252,9 +288,8 @@ class BuildingCharacterisation(Characterisation):
         path = ForcePath.of(result.time, mean, result.base_reaction, "the building")
         peaks = (float(result.extremes.mean_displacement[3]), summary["peak_force"]["radial"])
         load, gravity = result.scene.weight, result.scene.gravity
-        system = characterised(
-            result.scene.name, result.status, path, peaks, load, gravity, result.dissipated.sum(axis=1)
-        )
+        lost = (result.dissipated + result.interface_dissipated).sum(axis=1)
+        system = characterised(result.scene.name, result.status, path, peaks, load, gravity, lost)
         return cls(
             **vars(system),
             secant_period=effective_period(system.secant_stiffness, load, gravity),

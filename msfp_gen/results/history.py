@@ -29,6 +29,7 @@ STACK = ("body", "surface")
 
 ENERGY_BELOW: dict[str, str] = {  # of a bearing of a building
     "dissipated": "energy dissipated in the bearing",
+    "interface_dissipated": "energy dissipated by the dampers of its interface",
     "stored": "energy stored in the bearing and its interface",
 }
 ENERGY: dict[str, str] = {

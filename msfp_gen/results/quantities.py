@@ -19,7 +19,7 @@ class Quantity(NamedTuple):
     whether the largest or the least value governs a design; "" if neither does. at_rest: whether the quantity is
     defined only if the run ends at rest. of_parts: whether it is of parts of a building, which suites compare and
     bounds do not. kept: whether a study keeps it where its file names no quantities. extreme: whether it is the largest
-    or the least value over the run; None: as `governs`.
+    or the least value over the run; None: as `governs`. words: in tables and figures, in place of those of the column.
     """
 
     unit: str
@@ -30,6 +30,7 @@ class Quantity(NamedTuple):
     of_parts: bool = False
     kept: bool = False
     extreme: Side | None = None
+    words: str = ""
 
     @property
     def side(self) -> Side:
@@ -100,6 +101,12 @@ class Source(NamedTuple):
         """Why a characterised run has no value of the quantity; "" where no reason is known."""
         rests = getattr(characterisation, "at_rest", True)
         return "" if rests or not self.quantity.at_rest else MOVING
+
+    def words(self, column: str) -> str:
+        """The quantity in words, with the name of its part. column: its name."""
+        own = column.rpartition("_")[0] if self.part else column
+        words = self.quantity.words or own.replace("_", " ")
+        return words + (f" of {self.part}" if self.part else "")
 
     @property
     def compared(self) -> bool:

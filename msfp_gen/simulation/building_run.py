@@ -14,6 +14,8 @@ import numpy as np
 from msfp_gen.buildings.extremes import BuildingExtremes, lift_of, padded, temperature_of, vectors
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.buildings.spectra import Steps
+from msfp_gen.buildings.storey import FREEDOMS
 from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.errors import InputError, prefixed
@@ -27,7 +29,6 @@ from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.scene.effect_switching import Ending, monitor_options, next_effects, stopping_monitors
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
-from msfp_gen.scene.standing import seat_stiffness
 from msfp_gen.simulation.start import RestartState, transferred_heights, transferred_state
 from msfp_gen.specification.contract import WORKS, names
 from msfp_gen.specification.layout import Auto, Effects
@@ -64,7 +65,8 @@ def earlier_work(changes: Sequence[Change], bearing: int, shape: tuple[int, ...]
 
 
 OF_SURFACES = ("normal", "sliding", "rim", "compression", "temperature")  # of a row; not every model has the last two
-KEPT = (*OF_SURFACES, "kinetic", "potential", "rim_stored", "seat_stored", "work")
+STORED = ("kinetic", "potential", "restraint", "rim_stored", "seat_stored")
+KEPT = (*OF_SURFACES, *STORED, "work")
 
 
 class Asked(NamedTuple):
@@ -158,6 +160,10 @@ class Run(AnyRun, Protocol):
     @property
     def status(self) -> tuple[str, int, int, float]:
         """Name; bearing from 1, 0: the building; surface from 1, 0: none; value."""
+
+    @property
+    def steps(self) -> Array:
+        """Time [s] and accelerations of the nodes at the start and ends of steps, shape (steps + 1, 1 + 6 nodes)."""
 
     @property
     def peaks(self) -> Array:
@@ -295,6 +301,7 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
         [member.entries for member in members],
         [member.faces for member in members],
         vectors(scene),
+        np.stack([node.rows for node in building.nodes]),
         scene.places - scene.mass_centre,
         weight=float(scene.axial_loads.sum()),
         stops=grid.stops,
@@ -337,6 +344,7 @@ def result_of(run: BuildingRun) -> BuildingResult:
         return [rows[f"{name} {i}"] for i in range(count)]
 
     alike: dict[str, Any] = {name: rows[name] for name in ("time", *MOTIONS, *ENERGIES)}
+    steps = run.run.steps
     return BuildingResult(
         **alike,
         scene=run.scene,
@@ -348,28 +356,16 @@ def result_of(run: BuildingRun) -> BuildingResult:
         lift=padded(list(map(lift_of, of_bearings("compression"))), np.nan),
         temperature=padded(list(map(temperature_of, bearings, of_bearings("temperature"))), np.nan),
         dissipated=np.stack([sum((work[name] for name in DISSIPATED), np.zeros(1)) for work in works], axis=1),
-        stored=np.stack([_stored(run, rows, i) + works[i]["friction_stored"] for i in range(count)], axis=1),
+        interface_dissipated=np.stack([work["top_dissipated"] for work in works], axis=1),
+        stored=np.stack(
+            [sum((rows[f"{name} {i}"] for name in STORED), works[i]["friction_stored"]) for i in range(count)], axis=1
+        ),
         support=rows["ground"][:, run.scene.grounds[1]],
+        steps=Steps(steps[:, 0], steps[:, 1:].reshape(len(steps), -1, FREEDOMS)),
         counters=run.run.counts,
         extremes=run.extremes,
         monitored=run.notes,
     )
-
-
-def _stored(run: BuildingRun, rows: dict[str, Array], index: int) -> Array:
-    """Energy of a bearing and of the springs of its interface, less that in friction, shape (k,) [J]."""
-    upper, mount = rows[f"wrench {index}"][:, 1], run.scene.bearings[index]
-    interface = mount.interface
-    stiffness = [interface.stiffness, interface.stiffness, interface.vertical_stiffness]
-    stiffness += 2 * [interface.rotational_stiffness]
-    energy: Array = 0.5 * (upper[:, :5] ** 2 / stiffness).sum(axis=1)
-    if run.members[index].effects.uplift:  # the stiffness of the interface contains the contacts: docs/uplift.md
-        opening = (change.rows for change in run.changes if change.bearing == index and "uplift" in change.effects)
-        since, compliance = next(opening, 0), (1.0 / seat_stiffness(mount.bearing, interface)).sum()
-        energy[since:] -= 0.5 * compliance * (upper[since:, :3] ** 2).sum(axis=1)
-    for name in ("kinetic", "potential", "rim_stored", "seat_stored"):
-        energy = energy + rows[f"{name} {index}"]
-    return energy
 
 
 def _threads(threads: int | None, bearings: int) -> int:

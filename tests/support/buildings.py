@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from msfp_gen import Auto, BaseSlab, Bearing, Building, Effects, Motion, Solver, Storey, Top, presets, simulate
-from msfp_gen.buildings.extremes import CONTACT, OF_SURFACES, BuildingExtremes
+from msfp_gen.buildings.extremes import CONTACT, OF_SURFACES, BuildingExtremes, corner_points
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
 
@@ -92,9 +92,21 @@ def extremes_of_rows(result: BuildingResult) -> BuildingExtremes:
     most = {name: np.nan_to_num(getattr(result, name)).max(axis=0) for name in OF_SURFACES}
     force, axial = np.moveaxis(result.wrench[:, :, 1, :3], 1, 0), result.axial_force
     base = scene.bearings[0].node
+    points = {node.name: corner_points(scene, node.position) for node in scene.building.nodes}
+
+    def of_corners(order: int) -> np.ndarray:
+        motions = [[node.linked(point)[:3] for point in points[node.name]] for node in scene.building.nodes]
+        vectors = np.einsum(
+            "ncij,kj->nkci", motions, (result.displacement, result.velocity, result.acceleration)[order]
+        )
+        vectors = vectors if order else vectors - result.ground[:, 0][:, None]
+        return largest(np.moveaxis(vectors, 1, 2)).max(axis=1)
+
     return BuildingExtremes(
         node_acceleration=largest(nodes[:, :, 2, :3]),
         node_displacement=largest(nodes[:, :, 0, :3] - result.ground[:, 0]),
+        corner_acceleration=of_corners(2),
+        corner_displacement=of_corners(0),
         drift=largest(np.moveaxis(result.drift[..., :3], 1, 0)),
         corner_drift=largest(np.moveaxis(result.corner_drift, 0, -2)).max(axis=1, initial=0.0),
         storey_shear=largest(np.moveaxis(result.storey_force[..., :3], 1, 0)),

@@ -19,11 +19,11 @@ function addCharts(parent) {
   add({ title: "Orbit, mean of the bearings", xlabel: "u₁ = base − top [mm]", ylabel: "u₂ = base − top [mm]", equal: true, lines: [{ x: u[0], y: u[1], colour: shade(2) }] });
   for (const axis of [0, 1]) {
     const floors = report.nodes.map(({ name }, node) => ({ name, colour: shade(node), x: time, y: column((frame) => at("acceleration", frame, node)[axis]) }));
-    add({ title: `Floor accelerations along E${"₁₂"[axis]}`, xlabel: "time t [s]", ylabel: "acceleration [m/s²]", timed: true, lines: floors.reverse() });
+    add({ title: `Floor accelerations along E${"₁₂"[axis]} at ${report.plates ? "centres of mass" : "nodes"}`, xlabel: "time t [s]", ylabel: "acceleration [m/s²]", timed: true, lines: floors.reverse() });
   }
   if (report.storeys.length) {
     const drifts = report.storeys.map((name, storey) => ({ name, colour: shade(storey), x: time, y: column((frame) => 100 * at("drift", frame)[storey]) }));
-    add({ title: "Drift of the storeys", xlabel: "time t [s]", ylabel: "drift over height [%]", timed: true, lines: drifts });
+    add({ title: "Storey drifts at stiffness centres", xlabel: "time t [s]", ylabel: "drift over height [%]", timed: true, lines: drifts });
   }
   const loads = report.places.slice(0, DRAWN).map((_, index) => ({ colour: shade(index), x: time, y: column((frame) => at("ratio", frame)[index]) }));
   add({ title: "Axial force of every bearing", xlabel: "time t [s]", ylabel: "N over N at rest [-]", timed: true, lines: loads, levels: [{ y: 0, name: "uplift" }] });

@@ -28,6 +28,12 @@ typedef struct {
     int *columns; /* rising in each set */
 } pattern;
 
+/* Rows of one length that are added one by one. */
+typedef struct {
+    double *data;
+    size_t count, capacity;
+} table;
+
 /* A bearing in the stage that is being solved. */
 typedef struct {
     int status;
@@ -73,6 +79,7 @@ struct msfp_building {
     pattern moved;   /* attachments that each bearing moves with */
     pattern coupled; /* attachments that share a bearing with each attachment */
     pattern watched; /* coordinates that each vector of the scene depends on */
+    pattern of_node; /* coordinates that each node depends on */
     linear linear[FACTORS], *now;
     long clock;
     int solving;   /* stage */
@@ -93,8 +100,7 @@ struct msfp_building {
     uint64_t identity; /* of all that the run computes from but its two-ports */
     int *entries, *faces; /* as in the scene, of the present models */
     double *peaks; /* see peaks.c */
-    double *rows;
-    size_t row_count, row_capacity;
+    table rows, steps; /* see state.c */
 };
 
 /* ---- pool.c ---- */
@@ -148,6 +154,8 @@ void ends_now(msfp_building *b);
 /* ---- state.c ---- */
 
 int write_row(msfp_building *b);
+/* Record the accelerations of the nodes. */
+int write_step(msfp_building *b);
 /* Take the row of a bearing from its two-port; MSFP_OK or MSFP_E_MEMORY. */
 int read_row(msfp_building *b, int bearing);
 

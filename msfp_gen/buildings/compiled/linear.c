@@ -87,6 +87,7 @@ int find_patterns(msfp_building *b)
     double *shared = calloc(r * r + 1, sizeof *shared); /* 1 where a bearing moves with both */
     int status = shared ? MSFP_OK : MSFP_E_MEMORY;
     status = status ? status : find_pattern(&b->moved, s->rows, s->bearings, MSFP_WRENCH, s->attachments);
+    status = status ? status : find_pattern(&b->of_node, s->node_rows, s->nodes, MSFP_WRENCH, s->n);
     status = status ? status : find_pattern(&b->watched, s->vector_rows, s->vectors, 3, s->n);
     for (int j = 0; j < s->bearings && !status; ++j) {
         int count;

@@ -60,6 +60,8 @@ typedef struct {
     const int *vector_orders;                 /* [vectors] 0: of the coordinates, 1, 2: of their derivatives; */
     const double *vector_rows;                /* [vectors][3][n], less */
     const double *vector_grounds;             /* [vectors][grounds] shares of the displacements of the ground */
+    int nodes;                                /* whose accelerations are recorded at the end of each step: */
+    const double *node_rows;                  /* [nodes][6][n] their motions from the coordinates */
     const double *arms;                       /* [bearings][2] of the forces of the ground, for their torsion [m] */
     const double *stops, *jumps;              /* rising times at which a step ends; at which accelerations jump [s] */
     int stop_count, jump_count;
@@ -99,6 +101,9 @@ void msfp_building_counts(const msfp_building *b, long *counts);
  * each bearing the wrenches on both ends and the kept numbers of its row. */
 size_t msfp_building_row_size(const msfp_building *b);
 const double *msfp_building_rows(const msfp_building *b);
+/* A record for each step and the start [msfp_building_step_count]: time, and accelerations of all nodes. */
+size_t msfp_building_step_count(const msfp_building *b);
+const double *msfp_building_steps(const msfp_building *b);
 /* Peaks over all steps [msfp_building_peak_count]. Of a vector these are the largest magnitudes along E1, E2, E3 and in
  * the plane of E1 and E2. Of the building: of each vector; of the sum of the forces of the ground; its largest torsion;
  * kinetic and strain energy. Of each bearing: of the displacement of its lower end less that of the upper one; of the
@@ -112,7 +117,7 @@ void msfp_building_ends(msfp_building *b, int bearing, double *ends);
 /* The two-port of a bearing, counted from 0, was replaced in the scene by one of another model in the present state;
  * entries, faces: of its rows. The run goes on, also after a failure. Returns MSFP_OK or a status. */
 int msfp_building_replaced(msfp_building *b, int bearing, const int *entries, const int *faces);
-/* The state between two steps, with all rows, as bytes; in a run of the same scene and build the steps that follow are
+/* The state between two steps, with all rows and records, as bytes; in a run of the same scene and build the steps that follow are
  * those that followed there, bit by bit. */
 size_t msfp_building_snapshot_size(const msfp_building *b);
 void msfp_building_snapshot_write(const msfp_building *b, void *snapshot);

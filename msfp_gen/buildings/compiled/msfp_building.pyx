@@ -45,6 +45,8 @@ cdef extern from "msfp_building.h":
         const int *vector_orders
         const double *vector_rows
         const double *vector_grounds
+        int nodes
+        const double *node_rows
         const double *arms
         const double *stops
         const double *jumps
@@ -70,6 +72,8 @@ cdef extern from "msfp_building.h":
     const double *msfp_building_peaks(const msfp_building *) noexcept nogil
     void msfp_building_ends(msfp_building *, int, double *) noexcept nogil
     int msfp_building_replaced(msfp_building *, int, const int *, const int *) noexcept nogil
+    size_t msfp_building_step_count(const msfp_building *) noexcept nogil
+    const double *msfp_building_steps(const msfp_building *) noexcept nogil
     size_t msfp_building_row_size(const msfp_building *) noexcept nogil
     const double *msfp_building_rows(const msfp_building *) noexcept nogil
     size_t msfp_building_snapshot_size(const msfp_building *) noexcept nogil
@@ -98,19 +102,21 @@ cdef class Run:
     matrices (3, n, n): mass, damping, stiffness. attached (r,): coordinates at the bearings. ports: the two-ports of all
     bearings, which take no other steps. rows (bearings, 6, r). grounds: knots and coefficients of each motion. ground_of (bearings,). entries:
     of each bearing, indices into its row. faces (bearings, 7): where the contacts are in it. vectors: those of msfp_building.h: orders (k,), rows (k, 3, n), shares of the motions of the
-    ground (k, grounds). arms (bearings, 2) [m].
+    ground (k, grounds). node_rows (nodes, 6, n). arms (bearings, 2) [m].
     """
     cdef msfp_building *run
     cdef msfp_part *parts
     cdef msfp_piecewise *grounds
     cdef list held
+    cdef size_t nodes
 
-    def __cinit__(self, matrices, attached, ports, rows, grounds, ground_of, entries, faces, vectors, arms, *, double weight, stops, jumps,
+    def __cinit__(self, matrices, attached, ports, rows, grounds, ground_of, entries, faces, vectors, node_rows, arms, *, double weight, stops, jumps,
                   span_ends, span_steps, int method, double rtol, double max_step, double first_step, double max_steps,
                   double end, double output_step, int threads):
         cdef msfp_building_scene s
         cdef int i
-        held = self.held = [ports]
+        held, self.nodes = [ports], len(node_rows)
+        self.held = held
         s.n, s.attachments, s.bearings, s.grounds = len(matrices[0]), len(attached), len(ports), len(grounds)
         s.mass, s.damping, s.stiffness = _doubles(held, matrices[0]), _doubles(held, matrices[1]), _doubles(held, matrices[2])
         s.attached, s.rows, s.ground_of = _ints(held, attached), _doubles(held, rows), _ints(held, ground_of)
@@ -118,6 +124,7 @@ cdef class Run:
         s.entries, s.faces = _ints(held, np.concatenate(entries)), _ints(held, np.ravel(faces))
         s.vectors, s.vector_orders = len(vectors[0]), _ints(held, vectors[0])
         s.vector_rows, s.vector_grounds, s.arms = _doubles(held, vectors[1]), _doubles(held, vectors[2]), _doubles(held, arms)
+        s.nodes, s.node_rows = len(node_rows), _doubles(held, node_rows)
         s.weight, s.rtol, s.max_step, s.first_step, s.max_steps = weight, rtol, max_step, first_step, max_steps
         s.end, s.output_step, s.threads, s.method = end, output_step, threads, method
         s.stops, s.stop_count, s.jumps, s.jump_count = _doubles(held, stops), len(stops), _doubles(held, jumps), len(jumps)
@@ -201,6 +208,15 @@ cdef class Run:
     def row_count(self):
         """How many they are."""
         return self.progress().rows
+
+    @property
+    def steps(self):
+        """Time and accelerations of the nodes at the start and the end of every step (steps + 1, 1 + 6 nodes), a copy."""
+        cdef size_t count = msfp_building_step_count(self.run), size = 1 + 6 * self.nodes
+        if not count:
+            return np.zeros((0, size))
+        cdef const double[:, ::1] view = <double[:count, :size]>msfp_building_steps(self.run)
+        return np.array(view)
 
     @property
     def peaks(self):

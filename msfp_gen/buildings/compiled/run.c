@@ -97,6 +97,7 @@ static void begin(msfp_building *b)
         b->status = read_row(b, i);
     if (!b->status) {
         b->status = write_row(b);
+        b->status = b->status ? b->status : write_step(b);
         begin_peaks(b);
         note_peaks(b);
         for (int i = 0; i < s->bearings; ++i)
@@ -134,9 +135,9 @@ void msfp_building_free(msfp_building *b)
         free(b->members[i].row);
     void *all[] = { b->u,       b->v,      b->a,       b->slope,  b->tangent, b->force,   b->Q,       b->V,
                     b->free,    b->x,      b->residual, b->change, b->balance, b->scale,   b->matrix,  b->next_u, b->product,
-                    b->scratch, b->ground, b->stage_v, b->stage_a, b->members, b->piece,   b->pivots,  b->rows,
+                    b->scratch, b->ground, b->stage_v, b->stage_a, b->members, b->piece,   b->pivots,  b->rows.data, b->steps.data,
                     b->entries, b->faces,  b->peaks,   b->moved.begin, b->moved.columns, b->coupled.begin,
-                    b->coupled.columns, b->watched.begin, b->watched.columns };
+                    b->coupled.columns, b->watched.begin, b->watched.columns, b->of_node.begin, b->of_node.columns };
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         free(all[i]);
     free(b);
@@ -216,6 +217,7 @@ static void accept(msfp_building *b, double h, double t, double error)
     b->previous_error = error;
     ground_at(b, t);
     note_peaks(b);
+    b->status = b->status ? b->status : write_step(b);
     if (!b->status && (t >= next_row_time(b) - msfp_smallest_step(t) || t >= s->end - msfp_smallest_step(t))) {
         b->next_row += t >= next_row_time(b) - msfp_smallest_step(t);
         b->status = write_row(b);
@@ -321,7 +323,7 @@ int msfp_building_advance(msfp_building *b, long steps)
 void msfp_building_state(const msfp_building *b, msfp_building_progress *progress)
 {
     *progress = (msfp_building_progress){ b->status, b->status ? b->bearing : 0, b->surface, b->value, b->t,
-                                          b->row_count };
+                                          b->rows.count };
 }
 
 void msfp_building_counts(const msfp_building *b, long *counts) { memcpy(counts, b->counts, sizeof b->counts); }

@@ -18,18 +18,25 @@ size_t msfp_building_row_size(const msfp_building *b)
     return size;
 }
 
-const double *msfp_building_rows(const msfp_building *b) { return b->rows; }
+const double *msfp_building_rows(const msfp_building *b) { return b->rows.data; }
 
-static int room_for(msfp_building *b, size_t rows)
+static size_t step_size(const msfp_building *b) { return 1 + (size_t)b->scene.nodes * MSFP_WRENCH; }
+
+size_t msfp_building_step_count(const msfp_building *b) { return b->steps.count; }
+
+const double *msfp_building_steps(const msfp_building *b) { return b->steps.data; }
+
+/* Room for so many rows of that size. */
+static int room_for(table *t, size_t rows, size_t size)
 {
-    if (rows <= b->row_capacity)
+    if (rows <= t->capacity)
         return MSFP_OK;
-    const size_t wider = rows > 2 * b->row_capacity ? rows : 2 * b->row_capacity;
-    double *more = realloc(b->rows, wider * msfp_building_row_size(b) * sizeof *more);
+    const size_t wider = rows > 2 * t->capacity ? rows : 2 * t->capacity;
+    double *more = realloc(t->data, wider * size * sizeof *more);
     if (!more)
         return MSFP_E_MEMORY;
-    b->rows = more;
-    b->row_capacity = wider;
+    t->data = more;
+    t->capacity = wider;
     return MSFP_OK;
 }
 
@@ -51,9 +58,9 @@ int read_row(msfp_building *b, int bearing)
 int write_row(msfp_building *b)
 {
     const msfp_building_scene *s = &b->scene;
-    if (room_for(b, b->row_count + 1))
+    if (room_for(&b->rows, b->rows.count + 1, msfp_building_row_size(b)))
         return MSFP_E_MEMORY;
-    double *row = b->rows + b->row_count * msfp_building_row_size(b);
+    double *row = b->rows.data + b->rows.count * msfp_building_row_size(b);
     const int *entries = b->entries;
     row = put(row, &b->t, 1);
     row = put(row, b->u, s->n);
@@ -66,14 +73,30 @@ int write_row(msfp_building *b)
         for (int k = 0; k < s->entry_count[i]; ++k)
             *row++ = kept(&b->members[i], *entries++);
     }
-    ++b->row_count;
+    ++b->rows.count;
+    return MSFP_OK;
+}
+
+int write_step(msfp_building *b)
+{
+    const double *motion = b->scene.node_rows;
+    if (room_for(&b->steps, b->steps.count + 1, step_size(b)))
+        return MSFP_E_MEMORY;
+    double *row = b->steps.data + b->steps.count++ * step_size(b);
+    *row++ = b->t;
+    for (int k = 0; k < b->scene.nodes; ++k) {
+        int count;
+        const int *columns = columns_of(&b->of_node, k, &count);
+        for (int i = 0; i < MSFP_WRENCH; ++i, motion += b->scene.n)
+            *row++ = dot_at(count, columns, motion, b->a);
+    }
     return MSFP_OK;
 }
 
 /* ---- snapshots ---- */
 
-static const uint64_t magic = 0x6d73667062756933; /* "msfpbui3" */
-enum { HEAD = 3 };        /* that, the identity, and the number of rows */
+static const uint64_t magic = 0x6d73667062756934; /* "msfpbui4" */
+enum { HEAD = 4 };        /* that, the identity, and the numbers of rows and of steps */
 
 size_t entry_count(const msfp_building *b)
 {
@@ -109,6 +132,8 @@ uint64_t identity_of(const msfp_building *b)
         { s->vector_orders, (size_t)s->vectors * sizeof(int) },
         { s->vector_rows, (size_t)s->vectors * 3 * n * size },
         { s->vector_grounds, (size_t)s->vectors * g * size },
+        { &s->nodes, sizeof(int) },
+        { s->node_rows, (size_t)s->nodes * MSFP_WRENCH * n * size },
         { s->arms, k * 2 * size },
         { &s->stop_count, sizeof(int) },
         { s->stops, (size_t)s->stop_count * size },
@@ -190,12 +215,17 @@ static size_t fixed_size(const msfp_building *b)
 
 static size_t rows_size(const msfp_building *b, size_t rows) { return rows * msfp_building_row_size(b) * sizeof(double); }
 
-size_t msfp_building_snapshot_size(const msfp_building *b) { return fixed_size(b) + rows_size(b, b->row_count); }
+static size_t steps_size(const msfp_building *b, size_t steps) { return steps * step_size(b) * sizeof(double); }
+
+size_t msfp_building_snapshot_size(const msfp_building *b)
+{
+    return fixed_size(b) + rows_size(b, b->rows.count) + steps_size(b, b->steps.count);
+}
 
 void msfp_building_snapshot_write(const msfp_building *b, void *snapshot)
 {
     tape t = { snapshot, 0 };
-    uint64_t head[HEAD] = { magic, b->identity, b->row_count };
+    uint64_t head[HEAD] = { magic, b->identity, b->rows.count, b->steps.count };
     pass(&t, head, sizeof head);
     pass_state((msfp_building *)b, &t); /* which only reads it here */
     for (int i = 0; i < b->scene.bearings; ++i) {
@@ -203,7 +233,8 @@ void msfp_building_snapshot_write(const msfp_building *b, void *snapshot)
         part->api->port_snapshot_write(part->port, t.at);
         t.at += part->api->port_snapshot_size(part->port);
     }
-    pass(&t, b->rows, rows_size(b, b->row_count));
+    pass(&t, b->rows.data, rows_size(b, b->rows.count));
+    pass(&t, b->steps.data, steps_size(b, b->steps.count));
 }
 
 int msfp_building_snapshot_read(msfp_building *b, const void *snapshot, size_t size)
@@ -213,10 +244,10 @@ int msfp_building_snapshot_read(msfp_building *b, const void *snapshot, size_t s
     if (size < fixed_size(b))
         return MSFP_E_SNAPSHOT;
     pass(&t, head, sizeof head);
-    if (head[0] != magic || head[1] != b->identity || head[2] > size || !head[2] ||
-        size != fixed_size(b) + rows_size(b, head[2]))
+    if (head[0] != magic || head[1] != b->identity || head[2] > size || !head[2] || head[3] > size || !head[3] ||
+        size != fixed_size(b) + rows_size(b, head[2]) + steps_size(b, head[3]))
         return MSFP_E_SNAPSHOT;
-    if (room_for(b, head[2]))
+    if (room_for(&b->rows, head[2], msfp_building_row_size(b)) || room_for(&b->steps, head[3], step_size(b)))
         return MSFP_E_MEMORY;
     pass_state(b, &t);
     b->factored_beta = 0.0;
@@ -228,8 +259,10 @@ int msfp_building_snapshot_read(msfp_building *b, const void *snapshot, size_t s
             return status;
         t.at += own;
     }
-    pass(&t, b->rows, rows_size(b, head[2]));
-    b->row_count = head[2];
+    pass(&t, b->rows.data, rows_size(b, head[2]));
+    pass(&t, b->steps.data, steps_size(b, head[3]));
+    b->rows.count = head[2];
+    b->steps.count = head[3];
     b->status = MSFP_OK;
     return MSFP_OK;
 }

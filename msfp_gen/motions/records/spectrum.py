@@ -114,7 +114,7 @@ def response_spectrum(
     step, acceleration = _sampled(source)
     sd = []
     for value in period:
-        sd.append(_peak_measures(_displacements(acceleration, step, value, damping)))
+        sd.append(_peak_measures(displacements(acceleration, step, value, damping)))
         if progress is not None:
             progress(len(sd), len(period))
     return Spectrum(period, damping, np.array(sd), _peak_measures(acceleration))
@@ -132,15 +132,20 @@ def _sampled(source: Record | Corrected | ContinuousMotion) -> tuple[float, Arra
     return float(source.time[1] - source.time[0]), values - offset
 
 
-def _displacements(acceleration: Array, step: float, period: float, damping: float) -> Array:
-    """Relative displacement of an oscillator under each component: ndarray, shape (m, 3), [m]."""
+def displacements(acceleration: Array, step: float, period: float, damping: float) -> Array:
+    """Relative displacement of an oscillator under each component of a motion at rest before: shape (m, c) [m].
+
+    The response to a piecewise linear acceleration is exact (Nigam and Jennings, 1969), m - 1 intervals of one length
+    through one period of free vibration after the end. acceleration: shape (k, c) [m/s^2]. step: between samples [s].
+    period: [s]. damping: ratio to the critical damping [-].
+    """
     from scipy.signal import lfilter
 
     finer = max(1, int(np.ceil(_RESOLUTION * step / period)))
     times = np.arange(len(acceleration)) * float(finer)
     fine = np.arange(times[-1] + 1)
     load = -np.column_stack([np.interp(fine, times, column) for column in acceleration.T])
-    rest = np.zeros((int(np.ceil(period / (step / finer))) + 1, 3))
+    rest = np.zeros((int(np.ceil(period / (step / finer))) + 1, acceleration.shape[1]))
     load = np.concatenate([load, rest])
     b, a, first = _recursion(step / finer, 2 * np.pi / period, damping)
     # Initial state of the filter for an oscillator at rest: the first displacement is zero, the second is `first` p[0]

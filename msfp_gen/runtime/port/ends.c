@@ -184,3 +184,34 @@ void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_
     msfp_end_wrench_F_get(s.upper, wrench + MSFP_END_FREEDOMS);
     msfp_end_wrench_M_get(s.upper, wrench + MSFP_END_FREEDOMS + 3);
 }
+
+void msfp_port_dampers(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double weight, msfp_state *to)
+{
+    const double *top = run->parameters.top;
+    const double damping[3] = { top[MSFP_TOP_PARAMETERS_C], top[MSFP_TOP_PARAMETERS_C], top[MSFP_TOP_PARAMETERS_CV] };
+    double plate[3], more = 0.0;
+    msfp_body_V_get(run->work.body[NB], plate);
+    for (int i = 0; i < 3 && !port->loaded; ++i)
+        more += damping[i] * at->of[1][1][i] * (at->of[1][1][i] - 2.0 * plate[i]);
+    to->power[MSFP_WORK_TOP_DISSIPATED] += more;
+    to->power[MSFP_WORK_INPUT] += more;
+    to->work[MSFP_WORK_TOP_DISSIPATED] += weight * more;
+    to->work[MSFP_WORK_INPUT] += weight * more;
+}
+
+double msfp_port_springs(const msfp_port *port, const msfp_run *run, const msfp_ends *at)
+{
+    const double *top = run->parameters.top, *end = at->of[1][0];
+    const double k = top[MSFP_TOP_PARAMETERS_K], kv = top[MSFP_TOP_PARAMETERS_KV];
+    double plate[3], across[3], fixed[3] = { 0.0 };
+    if (port->loaded)
+        return 0.0;
+    msfp_body_C_get(run->work.body[NB], plate);
+    msfp_top_parameters_x0_get(top, fixed);
+    for (int i = 0; i < 3; ++i)
+        across[i] = plate[i] - port->plate[i] - end[i];
+    const double x = plate[0] - fixed[0], y = plate[1] - fixed[1], sunk = plate[2] - run->work.foot[MSFP_FOOT_Y];
+    const double compression = across[2] + (kv > 0.0 ? port->axial_load / kv : 0.0);
+    return 0.5 * k * (across[0] * across[0] + across[1] * across[1] - x * x - y * y) +
+           0.5 * kv * (compression * compression - sunk * sunk);
+}

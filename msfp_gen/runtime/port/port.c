@@ -65,6 +65,7 @@ msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, 
     msfp_port_paths(port, p, options->start_time, options->start_time + 1.0, &port->to);
     if (begin(port, p, options, q, v, f) == MSFP_OK) {
         memcpy(port->plate, port->committed.rows[0].top, sizeof port->plate);
+        port->committed.rows[0].restraint += msfp_port_springs(port, &port->committed, &port->from);
         msfp_port_wrench_of(port, &port->committed, &port->from, port->wrench);
     }
     return port;
@@ -91,8 +92,11 @@ int msfp_port_enter(msfp_port *port, const msfp_options *options, const double *
     msfp_run_free(run);
     msfp_run_free(&port->run);
     const int status = begin(port, &parameters, options, q, v, f);
-    if (status == MSFP_OK)
+    if (status == MSFP_OK) {
+        msfp_port_dampers(port, run, &port->from, 0.0, &run->now);
+        run->rows[0].restraint += msfp_port_springs(port, run, &port->from);
         msfp_port_wrench_of(port, run, &port->from, port->wrench);
+    }
     if (monitor_heat)
         memcpy(run->monitor.heat, monitor_heat, sizeof run->monitor.heat);
     port->trial_state = NO_TRIAL;

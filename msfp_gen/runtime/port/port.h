@@ -150,6 +150,11 @@ void msfp_port_histories(msfp_port *port, const msfp_ends *to, double h);
 void msfp_port_hold(msfp_port *port);
 /* Wrenches [end][6] of the evaluation in run->work, the ends at `at`. */
 void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double *wrench);
+/* Powers of a state, and its works by `weight` [s], with the motion of end B, which those of a run take to be at rest: the
+ * dampers of the interface lose c (V - v)^2 of the plate's velocity V and that of end B v; c v (v - 2 V) is input too. */
+void msfp_port_dampers(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double weight, msfp_state *to);
+/* Energy of the springs of the interface beyond that of the springs of the run, which are fixed elsewhere [J]. */
+double msfp_port_springs(const msfp_port *port, const msfp_run *run, const msfp_ends *at);
 
 /* ---- derivatives.c ---- */
 

@@ -41,6 +41,15 @@ void msfp_port_step_begin(msfp_port *port, double h, const double *expected)
     msfp_stages_begin(run, &port->step.stages, h);
 }
 
+/* The end of the stage that was solved last, the ends at port->to. */
+static void end_stage(msfp_port *port)
+{
+    msfp_run *run = &port->committed;
+    msfp_stages *s = &port->step.stages;
+    msfp_stage_end(run, s, port->step.stage);
+    msfp_port_dampers(port, run, &port->to, s->h * s->method->gamma, &s->stage[port->step.stage]);
+}
+
 /* Move the rates of the stage with those of end B: to first order they remain a solution. */
 static void follow(msfp_port *port, const msfp_ends *to)
 {
@@ -61,7 +70,7 @@ int msfp_port_stage(msfp_port *port, int i, const double *ends, double *wrench)
     const int again = i == port->step.stage;
     if (!again) {
         if (port->step.stage > 0)
-            msfp_stage_end(run, s, port->step.stage);
+            end_stage(port);
         msfp_stage_begin(run, s, i);
         port->step.stage = i;
     }
@@ -92,7 +101,7 @@ int msfp_port_step_end(msfp_port *port, double *error, double *share)
     msfp_port_step *step = &port->step;
     const double energy = run->now.energy;
     *share = 1.0;
-    msfp_stage_end(run, &step->stages, step->stage);
+    end_stage(port);
     msfp_stages_end(run, &step->stages, error);
     step->stage = MSFP_NO_STEP;
     if (!(*error < INFINITY))
@@ -146,6 +155,7 @@ int msfp_port_step_commit(msfp_port *port, double t)
     port->step.finished = 0;
     msfp_row *row = &run->rows[0];
     msfp_record(&run->parameters, &run->reached, &run->work, &run->now.mechanical, row);
+    row->restraint += msfp_port_springs(port, run, &port->from);
     row->time = t;
     memcpy(row->work, run->now.work, sizeof row->work);
     return MSFP_OK;
@@ -156,8 +166,10 @@ int msfp_port_jump(msfp_port *port, const double *ends)
     memcpy(&port->from, ends, sizeof port->from);
     msfp_port_hold(port);
     const int status = msfp_consistent_initial_state(&port->committed);
-    if (status == MSFP_OK)
+    if (status == MSFP_OK) {
+        msfp_port_dampers(port, &port->committed, &port->from, 0.0, &port->committed.now);
         msfp_port_wrench_of(port, &port->committed, &port->from, port->wrench);
+    }
     return status;
 }
 

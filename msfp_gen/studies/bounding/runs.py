@@ -319,7 +319,7 @@ def shown_as(unit: str) -> tuple[str, float]:
 def bounding_tables(bounds: Bounds) -> list[Table]:
     """Tables of factors, lambdas by surface, quantities and verdicts by case, failed runs, and undefined quantities."""
     failed = [(case.name, case.failure) for case in bounds.cases if case.failure]
-    unknown = [(name.replace("_", " "), why) for name, why in bounds.undefined().items()]
+    unknown = [(bounds.compared[name].words(name), why) for name, why in bounds.undefined().items()]
     extra = [Table("runs that failed", (), failed)] if failed else []
     extra += [Table("what is not defined, and why", (), unknown)] if unknown else []
     verdicts = Table("verdicts: limits of the device (docs/limits.md)", (), list(bounds.verdicts().items()))
@@ -387,7 +387,7 @@ def _quantity_table(bounds: Bounds) -> Table:
         if any(value is not None for value in values.values()):
             unit, scale = shown_as(sources[name].quantity.unit)
             cells = ["-" if (value := values[case]) is None else f"{value * scale:.4g}" for case in CASES]
-            rows.append((f"{name.replace('_', ' ')} [{unit}]", *cells, governing.get(name, "")))
+            rows.append((f"{sources[name].words(name)} [{unit}]", *cells, governing.get(name, "")))
     return Table("results; properties of cycles are their means", ("", *CASES, "governs"), rows)
 
 

@@ -185,10 +185,10 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
         if not statistic.part:
             unit, scale = shown_as(statistic.unit)
             numbers = [f"{value * scale:.4g}" for value in (*statistic.means, *statistic.worst)]
-            name = f"{_label(statistic.name, '')} [{unit}]"
+            name = f"{bounds.sources[statistic.name].words(statistic.name)} [{unit}]"
             rows.append((name, *numbers, statistic.governs, statistic.record))
     columns = ("", *(f"mean {case}" for case in CASES), *(f"worst {case}" for case in CASES), "governs", "worst record")
-    reasons = [(_label(name, bounds.sources[name].part), why) for name, why in bounds.left_out.items()]
+    reasons = [(bounds.sources[name].words(name), why) for name, why in bounds.left_out.items()]
     exceeded = [(f"{record}, {case}", verdict) for (record, case), verdict in bounds.exceeded.items()]
     stopped = [(f"{record}, {case}", f"{time:.4g} s") for (record, case), time in bounds.stopped.items()]
     failed = [(f"{record}, {case}", message) for (record, case), message in bounds.failures.items()]
@@ -202,12 +202,6 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
     return [table for table in tables if table.rows]
 
 
-def _label(name: str, part: str) -> str:
-    """A column in words; its number is replaced by the name of the part."""
-    stem = name.rpartition("_")[0] if part else name
-    return stem.replace("_", " ") + (f" of {part}" if part else "")
-
-
 def write_statistics(bounds: SuiteBounds, path: str | Path) -> Path:
     """Write the statistics as CSV in SI units: one row for each quantity, with the name of its part.
 
@@ -215,7 +209,7 @@ def write_statistics(bounds: SuiteBounds, path: str | Path) -> Path:
     """
     rows = bounds.statistics
     columns: dict[tuple[str, str], list[Any]] = {
-        ("quantity", ""): [_label(row.name, row.part) for row in rows],
+        ("quantity", ""): [bounds.sources[row.name].words(row.name) for row in rows],
         ("of", ""): [row.part for row in rows],
         ("unit", ""): [row.unit or "1" for row in rows],
         **{(f"mean {case}", ""): [row.means[i] for row in rows] for i, case in enumerate(CASES)},
@@ -244,7 +238,7 @@ def write_records(bounds: SuiteBounds, path: str | Path) -> Path:
     }
     for name, values in bounds.values.items():
         cells = [None if np.isnan(value) else value for value in values.reshape(len(bounds.records) * count).tolist()]
-        columns[_label(name, bounds.sources[name].part), bounds.sources[name].quantity.unit or "1"] = cells
+        columns[bounds.sources[name].words(name), bounds.sources[name].quantity.unit or "1"] = cells
     return write_columns(check_output(path, (".csv",)), columns)
 
 
@@ -274,5 +268,5 @@ def _draw(axes: Axes, bounds: SuiteBounds, name: str, colours: Sequence[str]) ->
         axes.plot(CASES, of_record, color=colour, marker="o", markersize=4, label=plain(record))
     if bounds.has_mean(name):
         axes.plot(CASES, values.mean(axis=0), color=INK, linewidth=2.5, label="mean")
-    axes.set(title=name.replace("_", " "), ylabel=f"[{unit}]")
+    axes.set(title=bounds.sources[name].words(name), ylabel=f"[{unit}]")
     axes.set_ylim(bottom=min(0.0, float(np.nanmin(values))))

@@ -257,5 +257,16 @@ def test_messages_of_bad_storeys():
         replace(STOREY, vertical_stiffness=1.0)
     with pytest.raises(InputError, match=r"node = 'roof': .* 'base', 'floor 1'"):
         Building.shear(BASE, [STOREY]).node("roof")
+
+
+def test_nodes_of_one_rigid_body_share_its_coordinates():
+    """As of a building of matrices that is taken for rigid; other nodes with coordinates of another are refused."""
+    frame = Building.shear(BASE, [STOREY])
+    base, corner = frame.nodes[0], np.array([3.0, 2.0, 0.0])
+    linked = replace(base, name="corner", position=corner, rows=base.linked(corner))
+    assert replace(frame, nodes=(*frame.nodes, linked)).boundary == frame.boundary
+    bent = replace(linked, rows=linked.rows * np.array([2.0, 1, 1, 1, 1, 1])[:, None])
+    with pytest.raises(InputError, match=r"building\.nodes\['corner'\]: coordinate 0 is that of another node"):
+        _ = replace(frame, nodes=(*frame.nodes, bent)).boundary
     with pytest.raises(InputError, match="frequency = 0"):
         Building.shear(BASE, [STOREY]).reduced(0)

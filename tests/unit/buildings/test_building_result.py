@@ -20,6 +20,7 @@ from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import plot_loops, plot_orbit, plot_result, plot_sliding
 from msfp_gen.results.characterise import characterised, csv_rows
 from msfp_gen.results.files import table_of
+from msfp_gen.results.history import ENERGY_BELOW
 from msfp_gen.results.joining import at_times
 from msfp_gen.results.loops import ForcePath as Motions
 from msfp_gen.results.note import Note
@@ -37,7 +38,8 @@ def test_the_note_of_a_cheaper_model_is_read_from_the_file(tmp_path: Path):
 
 def test_few_lines():
     lines = repr(pushed()).splitlines()
-    assert len(lines) <= 10 and lines[0] == "Result of frame" and "status" in lines[1]
+    assert len(lines) <= 11 and lines[0] == "Result of frame" and "status" in lines[1]
+    assert any("at centres of mass" in line and "at corners" in line for line in lines)
     assert lines[2] == "  verdict           within the limits of the device"
     steps = pushed().counters["steps"]
     assert steps != len(pushed().time) - 1 and f"s in {steps} steps" in lines[3]
@@ -86,7 +88,7 @@ def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
     """Variables, units and meanings of its dataset, keys of its summary, quantities of its characterisation, files."""
     one, alone = pushed().bearings[1], loops_of_one()
     for name, variable in one.dataset.data_vars.items():
-        assert name in alone.dataset or name in ("energy_dissipated", "energy_stored")
+        assert name in alone.dataset or name in {f"energy_{word}" for word in ENERGY_BELOW}
         if name in alone.dataset:
             assert variable.dims == alone.dataset[name].dims and variable.attrs == alone.dataset[name].attrs
     assert np.array_equal(one.dataset["top_force"], one.history.top_force) and one.dataset.sizes["surface"] == 4
@@ -156,7 +158,8 @@ def test_drift_at_a_corner_is_that_of_both_floors_there():
         pushed_scene().places.max(axis=0),
         np.diff([node.position[2] for node in pushed_scene().building.nodes])[1],
     )
-    turned = [node[:, :2] + node[:, 5:] * [-y, x] for node in (below, above)]
+    centre = found.scene.building.node("floor 1").position
+    turned = [node[:, :2] + node[:, 5:] * [centre[1] - y, x - centre[0]] for node in (below, above)]
     tilt = 0.5 * height * np.stack([above[:, 4] + below[:, 4], -above[:, 3] - below[:, 3]], axis=1)
     assert found.corner_drift[:, 1, 2, :2] == pytest.approx(turned[1] - turned[0] - tilt, abs=1e-9)
     for storey, most in zip(found.summary["storeys"], found.corner_drift, strict=False):

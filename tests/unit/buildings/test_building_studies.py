@@ -17,6 +17,7 @@ from msfp_gen.cli import main
 from msfp_gen.studies.bounding import bounded_scenes, load_factors
 from msfp_gen.studies.bounding.runs import bounded_scene, bounding_tables, plot_bounds, write_quantities
 from msfp_gen.studies.definition import load_study
+from msfp_gen.studies.sweep import variations
 
 TEXT = """
 name = "slab"
@@ -86,6 +87,8 @@ def test_bounds_multiply_the_properties_of_every_bearing(path: Path, tmp_path: P
     plot_bounds(found, tmp_path / "bounds.png")
     rows = list(csv.reader(write_quantities(found, tmp_path / "bounds.csv").read_text(encoding="utf-8").splitlines()))
     assert [row[0] for row in rows if "floor" in row[0]] == ["peak_floor_acceleration [m/s^2]"]
+    words = [row[0] for table in bounding_tables(found) for row in table.rows]
+    assert "peak base shear [kN]" in words and not any(word.startswith("peak force") for word in words)
     assert found.bearing == scene.bearings[0].bearing
 
 
@@ -194,6 +197,44 @@ def test_messages_of_studies(path: Path, tmp_path: Path, old, new, message):
     file.write_text(STUDY.replace(old, new), encoding="utf-8")
     with pytest.raises(InputError, match=message):
         load_study(file)
+
+
+OWN = '[building.bearing.motion]\nkind = "ramp"\nacceleration = 1.0\nduration = 0.3\n'
+SUITE = '[[records]]\nname = "ccc"\nbundled = "ridgecrest-2019-ci-ccc"\n'
+RECORDS = '[records]\nmotions = [{ name = "ccc", bundled = "ridgecrest-2019-ci-ccc" }]\nscales = [1.0, 2.0]\n'
+
+
+@pytest.mark.parametrize("bearings", [1, 3])
+@pytest.mark.parametrize("command", ["batch", "bound", "study"])
+def test_records_are_refused_below_bearings_with_motions_of_their_own(path, tmp_path, command, bearings, capsys):
+    """Records and scales change the motion of the scene, which such a bearing does not have."""
+    suite, definition = tmp_path / "suite.toml", tmp_path / "study.toml"
+    path.write_text(_own(bearings))
+    suite.write_text(SUITE)
+    definition.write_text(f'scene = "slab.toml"\n{RECORDS}')
+    given = [str(definition), "-o", str(tmp_path / "out")] if command == "study" else [str(path), "--suite", str(suite)]
+    assert main([command, *given]) == 2
+    words = " ".join(capsys.readouterr().err.split())
+    assert "building.bearing[0].motion: this bearing has a motion of its own, and records" in words
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_motion_that_no_bearing_has_is_no_axis(path: Path):
+    fields = [("motion.acceleration", [1.0, 2.0])]
+    path.write_text(_own(2))
+    assert len(variations(path, fields)) == 2  # the third bearing moves with the scene
+    path.write_text(_own(3))
+    with pytest.raises(InputError, match=r"building\.bearing\[0\]\.motion: .*no bearing is left on the motion of the "):
+        variations(path, fields)
+
+
+def _own(bearings: int) -> str:
+    """The scene with motions of their own below so many bearings."""
+    head, *rows = TEXT.split("[[building.bearing]]")
+    *rows, last = rows
+    last, motion = last.split("[motion]")
+    rows = [row + OWN * (index < bearings) for index, row in enumerate([*rows, last])]
+    return "[[building.bearing]]".join([head, *rows]) + "\n[motion]" + motion
 
 
 def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -1,0 +1,67 @@
+"""Floor spectra of a building: the accelerations at the ends of all steps come in, peaks of oscillators go out."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen.buildings.extremes import corner_points
+from msfp_gen.buildings.storey import rigid
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
+from msfp_gen.motions.records.spectrum import displacements
+
+PERIODS = np.geomspace(0.03, 5.0, 120)  # unless others are given [s]
+SAMPLE = 1e-3  # between the samples of an acceleration that is linear in every step [s]
+
+
+class Steps(NamedTuple):
+    """What is recorded at the start of a run and at the end of every step.
+
+    time: shape (s,) [s]. acceleration: of the nodes, shape (s, nodes, 6) [m/s^2, rad/s^2].
+    """
+
+    time: Array
+    acceleration: Array
+
+
+class FloorSpectra(NamedTuple):
+    """Pseudo-acceleration spectra of the floors of a building, along E1, E2 and E3.
+
+    periods: shape (p,) [s]. damping: ratio to the critical damping [-]. names: of the nodes. nodes: of a floor at its
+    centre of mass, shape (nodes, p, 3) [m/s^2]. corners: the largest at the corners of the plan on this floor, of a
+    node that is no floor as `nodes`, shape (nodes, p, 3) [m/s^2].
+    """
+
+    periods: Array
+    damping: float
+    names: tuple[str, ...]
+    nodes: Array
+    corners: Array
+
+
+def floor_spectra(result: Any, periods: ArrayLike | None, damping: float) -> FloorSpectra:
+    """The spectra of a `BuildingResult`; arguments and errors as of `BuildingResult.floor_spectra`."""
+    given = PERIODS if periods is None else np.asarray(periods, dtype=float)
+    if given.ndim != 1 or not given.size or not np.all((given > 0) & np.isfinite(given)):
+        raise InputError(f"periods = {given.tolist()!r:.60}: give a list of positive numbers [s]")
+    if not 0 < damping < 1:
+        raise InputError(f"damping = {damping!r}: give a ratio above 0 and below 1")
+    nodes = result.scene.building.nodes
+    time, end = result.steps.time, float(result.steps.time[-1])
+    sampled = np.linspace(0.0, end, max(2, round(end / SAMPLE) + 1))
+    at_nodes, at_corners = np.zeros((2, len(nodes), len(given), 3))
+    if not end > 0:  # a run that ended at its start
+        return FloorSpectra(given, float(damping), tuple(node.name for node in nodes), at_nodes, at_corners)
+    for index, node in enumerate(nodes):
+        motion = result.steps.acceleration[:, index]
+        motion = np.column_stack([np.interp(sampled, time, freedom) for freedom in motion.T])
+        points = corner_points(result.scene, node.position) if node.floor else node.position[None]
+        arms = np.concatenate([rigid(point - node.position)[:3] for point in points])
+        for row, period in enumerate(given):
+            response = displacements(motion, float(sampled[1]), float(period), damping) * (2 * np.pi / period) ** 2
+            at_nodes[index, row] = np.abs(response[:, :3]).max(axis=0)
+            at_corners[index, row] = np.abs(response @ arms.T).max(axis=0).reshape(-1, 3).max(axis=0)
+    return FloorSpectra(given, float(damping), tuple(node.name for node in nodes), at_nodes, at_corners)
