@@ -68,6 +68,17 @@ def test_test_2_of_chapter_4_is_that_of_simulate(end, step, capsys):
     assert difference(load_scene("fenz-test2"), end, step, capsys) < 1e-3
 
 
+@pytest.mark.slow
+def test_a_record_is_that_of_simulate(capsys):
+    """Five seconds of the Ridgecrest record, three components, under the rig of chapter 4."""
+    scene = load_scene("ridgecrest-clc")
+    bearing = scene.bearing.replace(reference_pressure=None)
+    top = Top.rig(112e3, 1e8, 1e4, 1e7, 1e4)
+    scene = replace(scene, bearing=bearing, top=top, effects=Effects(bouc_wen="report"))
+    scene = replace(scene, solver=replace(scene.solver, rtol=1e-6))
+    assert difference(scene, 5.0, 1.5e-3, capsys) < 1e-3
+
+
 def test_both_integrations_tend_to_one_solution():
     """The midpoint rule with its order two, against Dormand and Prince; soft friction, with which that is quick."""
     bearing, motion = presets.bearing("single-articulated-fp"), Motion.harmonic(amplitude=0.05, frequency=1.0)
