@@ -223,7 +223,7 @@ def small_oscillations(bearing, top):
     mass = move.T @ np.diag(m) @ move + np.diag(J)
     at_top = np.append(D[:-1], D[-1] + top.height)
     mass += top.mass * np.outer(at_top, at_top)
-    mass[-1, -1] += top.inertia
+    mass[-1, -1] += top.inertia[0]
     carried = np.cumsum(np.append(m[1:], top.mass)[::-1])[::-1]
     weights = -g * np.diag(m * c + carried * D)
     weights[-1, -1] += top.rotational_stiffness - top.mass * g * top.height
