@@ -38,8 +38,8 @@ from msfp_gen import (
     presets,
 )
 from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.buildings.run import result_of, start_run
 from msfp_gen.common.arrays import Array
-from msfp_gen.simulation.building_run import result_of, start_run
 from msfp_gen.studies.accuracy.series import Series
 
 CLIENT = Path(__file__).parents[1] / "tests" / "support" / "opensees_buildings.py"

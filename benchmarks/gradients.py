@@ -22,8 +22,8 @@ from msfp_gen import Scene, load_scene
 from msfp_gen.generator.lower import GRADIENT_COLUMNS
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.parameters import parameters_of
+from msfp_gen.simulation.bearing_run import BearingRun
 from msfp_gen.simulation.gradients import start_gradients
-from msfp_gen.simulation.simulate import RunSequence
 
 REPEATS = pick(9, 1)
 FIELDS = ("friction", "radius", "yield_displacement", "capacity")
@@ -35,7 +35,7 @@ SCENES = {"`fenz-test2`": "fenz-test2", "`fenz-test5`": "fenz-test5", "`becker-c
 def seconds(scene: Scene, paths: Sequence[str], energies: bool = False) -> tuple[float, dict[str, int]]:
     """Processor time of the integration, and its counters. energies: differentiate the integrals over the run too."""
     model = build_model(scene.bearing.layout, scene.modelled, gradients=bool(paths))
-    run, _ = RunSequence.of(scene).start_segment(model)
+    run, _ = BearingRun.of(scene).start_segment(model)
     if paths:
         start_gradients(run, scene, model, parameters_of(scene, paths), energies=energies)
     start = time.process_time()

@@ -24,7 +24,8 @@ from msfp_gen.results.history import History
 from msfp_gen.results.result import Result
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, is_sprung
-from msfp_gen.simulation.simulate import RunSequence
+from msfp_gen.simulation.bearing_run import BearingRun
+from msfp_gen.simulation.system import finish
 
 Array = Any
 ROWS = 6  # of a run that are checked
@@ -39,9 +40,8 @@ TIMES = 100  # smaller tolerance of the run that decides between two that differ
 def verified(scene: Scene, given: Result) -> dict[str, Any]:
     """Violations of both checks under `wrong`, and how far the run was from them. given: the result of the scene."""
     scene = replace(turned(scene), output_step=None)
-    sequence = RunSequence.of(scene)
-    while sequence.effects is not None:
-        sequence.run_segment()
+    sequence = BearingRun.of(scene)
+    finish(sequence, scene.end)
     whole = sequence.result()
     left = worst_row(scene, sequence, whole.history) if whole.succeeded else 0.0
     found: dict[str, Any] = {"unbalanced": left, "wrong": []}
@@ -63,7 +63,7 @@ def rings(scene: Scene, *results: Result) -> bool:
     return undamped and any(result.status == "steps" for result in results)
 
 
-def worst_row(scene: Scene, sequence: RunSequence, history: History) -> float:
+def worst_row(scene: Scene, sequence: BearingRun, history: History) -> float:
     """The largest part of the balances that is left at some rows of a run.
 
     Left out are rows at a jump, which have the values of either side; the start of massless sliders, which come to

@@ -304,6 +304,18 @@ class BuildingScene(OtherSystem):
         models = [ModelSpec(mount.bearing.layout, replace(effects, top_rotation=True)) for mount, effects in pairs]
         return tuple(dict.fromkeys(models))
 
+    def start(self, **options: Any) -> Any:
+        """The run before its first step, as of `simulation.system.start`."""
+        from msfp_gen.buildings.run import start_run
+
+        return start_run(self, **options)
+
+    def text(self) -> str:
+        """The scene as text, as of `scene.file.loader.scene_text`."""
+        from msfp_gen.buildings.dataset import scene_text
+
+        return scene_text(self) + f"[motion]\nname = {self.motion.name!r}\nduration = {self.motion.duration}\n"
+
     def explain(self) -> list[Table]:
         """Tables that describe the scene, as of `scene.explain.explain`."""
         from msfp_gen.buildings.explain import explain

@@ -15,20 +15,30 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import check_folder, clear_leftovers, write_bytes
-from msfp_gen.model.compiled import Run
-from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.building_run import BuildingRun
+from msfp_gen.scene.system import System
 
 MAGIC = b"msfp-gen checkpoint 3\n"
 EVERY = 60.0  # wall time between two checkpoints [s]
 WRITE_INTERVAL = 20  # least time between two checkpoints, over the time to write one: limits the cost of writing
 
-Resumable = Run | BuildingRun  # of a bearing or of a building: it can be saved and continued
+
+class Resumable(Protocol):
+    """A run that can be saved and continued."""
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+
+    def snapshot(self) -> bytes:
+        """State with all rows."""
+
+    def restore(self, snapshot: bytes) -> None:
+        """Continue from a snapshot. Raises ValueError."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +49,7 @@ class Identity:
     digest: str
 
     @classmethod
-    def of(cls, scene: Scene) -> Identity:
+    def of(cls, scene: System) -> Identity:
         """The identity of a run of `scene`."""
         from msfp_gen.scene.file.loader import scene_text
 

@@ -266,9 +266,7 @@ CONTACT_IN_LONG_STEP = (
 )
 
 
-def gradient_parameters(
-    scene: Scene, paths: Sequence[str], checkpoint: object = None, energies: bool = False
-) -> tuple[Parameter, ...]:
+def gradient_parameters(scene: Scene, paths: Sequence[str], energies: bool = False) -> tuple[Parameter, ...]:
     """The parameters at some paths. Raises InputError for an unknown one, and for a run that has no gradients."""
     parameters = parameters_of(scene, paths)
     if energies and not parameters:
@@ -288,8 +286,6 @@ def gradient_parameters(
         raise InputError(
             f"gradients = {states[0]!r}: tilted plates start in the state after a slow tilting; give an initial_state"
         )
-    if checkpoint is not None:
-        raise InputError(f"checkpoint = {str(checkpoint)!r}: a checkpoint holds no gradients; leave out one of them")
     return parameters
 
 

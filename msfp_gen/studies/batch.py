@@ -33,7 +33,7 @@ from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import System, is_system
 from msfp_gen.simulation.memory import require_memory
-from msfp_gen.simulation.simulate import simulate, state_at_start
+from msfp_gen.simulation.simulate import integrate
 from msfp_gen.studies.estimation.backbone_run import check_backbone, run_backbone
 
 T = TypeVar("T")
@@ -363,15 +363,14 @@ def run_to_end(
             raise _OutOfTime
 
     try:
-        return simulate(scene, progress=proceed, **options)
-    except RunError as error:
+        result = integrate(scene, progress=proceed, with_initial_row=True, **options)
+    except RunError:
         if expired:
-            raise RunError(f"ended after {seconds:g} s of wall time", status=OUT_OF_TIME, result=error.result) from None
-        if error.result is not None:
-            return error.result
-        if not isinstance(scene, Scene) or error.status == "interrupted":
-            raise
-    return state_at_start(scene, options.get("strict", False))
+            raise RunError(f"ended after {seconds:g} s of wall time", status=OUT_OF_TIME) from None
+        raise
+    if expired:
+        raise RunError(f"ended after {seconds:g} s of wall time", status=OUT_OF_TIME, result=result)
+    return result
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from msfp_gen.common.fields import Quantity, ruled_fields
 from msfp_gen.results.geometry import friction_circles, poses
 from msfp_gen.results.result import Result
 from msfp_gen.scene.file.loader import scene_from_table
-from msfp_gen.simulation import simulate as simulation
+from msfp_gen.simulation import bearing_run as simulation
 from msfp_gen.specification.formula import FUNCTIONS
 from msfp_gen.specification.friction_laws import BUILT_IN, HEAT_KERNEL, VARIABLES, law_parameter_names
 from msfp_gen.studies.bounding import bounded_scenes, load_factors

@@ -18,9 +18,9 @@ from msfp_gen.results.history import ENERGY
 from msfp_gen.results.run_data import ENERGIES
 from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.parameters import Parameter, changed_parameters, parameters_of
+from msfp_gen.simulation.bearing_run import BearingRun
 from msfp_gen.simulation.gradients import start_gradients
 from msfp_gen.simulation.rows import unpacked
-from msfp_gen.simulation.simulate import RunSequence
 
 STACK = (
     "bearing.surfaces[*].friction", "bearing.surfaces[0].radius", "bearing.surfaces[0].yield_displacement",
@@ -62,7 +62,7 @@ class FrozenSteps:
 
     def run(self, scene: Scene, parameters: Sequence[Parameter]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         """Rows by field, and their derivatives with respect to each parameter."""
-        run, azimuth = RunSequence.of(scene).start_segment(self.model)
+        run, azimuth = BearingRun.of(scene).start_segment(self.model)
         start_gradients(run, scene, self.model, parameters, list(self.steps), energies=True)
         while run.advance():
             pass

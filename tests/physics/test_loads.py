@@ -15,7 +15,7 @@ from msfp_gen import Auto, Effects, InputError, Load, Motion, Rotation, Scene, T
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.results.result import Result
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
-from msfp_gen.simulation.simulate import settle
+from msfp_gen.simulation.bearing_run import settle
 from msfp_gen.simulation.start import needs_settling, settling_scene
 from msfp_gen.studies.accuracy.methods import run_library
 from msfp_gen.studies.accuracy.series import run_opensees, run_series

@@ -265,7 +265,7 @@ def test_a_rig_that_lets_the_bearing_go_is_modelled_with_uplift():
 
 @pytest.mark.parametrize("method", thinned(["implicit", "dopri5"], lambda method: method == "implicit"))
 def test_a_resumed_run_repeats_every_bit(tmp_path, monkeypatch, method):
-    monkeypatch.setattr("msfp_gen.simulation.simulate.STEPS_PER_CALL", 20)
+    monkeypatch.setattr("msfp_gen.simulation.bearing_run.STEPS_PER_CALL", 20)
     given, path = scene(SWAY, sprung(), method=method, rtol=1e-4), tmp_path / "checkpoint"
     whole = simulate(given)
     interrupted(given, path, when=0.4)

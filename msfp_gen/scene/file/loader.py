@@ -8,7 +8,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache, partial
+from functools import lru_cache, partial, singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -168,7 +168,15 @@ def bearing_table(bearing: Bearing) -> Table:
     }
 
 
-def scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
+@singledispatch
+def scene_text(system: Any) -> str:
+    """A scene as text, for files and checkpoints: see `bearing_scene_text`, which it is of a scene of one bearing."""
+    text: str = system.text()
+    return text
+
+
+@scene_text.register(Scene)
+def bearing_scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
     """The scene as TOML text from which `load_scene` makes an equal scene; in SI units, with the complete bearing.
 
     motion: table to write as `[motion]`; None: that of the scene's own motion; an empty table: `[motion]` is omitted.

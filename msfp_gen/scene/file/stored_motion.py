@@ -16,7 +16,7 @@ import numpy as np
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Notes
 from msfp_gen.motions.motion import CHANNELS, Motion
-from msfp_gen.scene.file.loader import scene_text
+from msfp_gen.scene.file.loader import bearing_scene_text
 from msfp_gen.scene.file.motion_tables import Pieces, motion_from
 
 if TYPE_CHECKING:
@@ -34,9 +34,9 @@ def scene_attribute(scene: Scene) -> str:
     """The scene as TOML text without the polynomials of its motion and without folders of this machine."""
     table = scene.motion_table
     if not needs_pieces(scene):
-        return scene_text(scene, table)
+        return bearing_scene_text(scene, table)
     informative = table is not None and "file" in table and _makes(table, scene.motion)
-    return scene_text(scene, {**table, **_file_names(table)} if table is not None and informative else {})
+    return bearing_scene_text(scene, {**table, **_file_names(table)} if table is not None and informative else {})
 
 
 def needs_pieces(scene: Scene) -> bool:

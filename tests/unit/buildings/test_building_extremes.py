@@ -10,10 +10,10 @@ import pytest
 from support.buildings import BEARING, extremes_of_rows, frame, scene
 
 from msfp_gen import Motion, Solver, simulate
+from msfp_gen.buildings import run as building_run
 from msfp_gen.buildings.extremes import BuildingExtremes
+from msfp_gen.buildings.run import start_run, unpacked
 from msfp_gen.results.geometry import contact_offsets
-from msfp_gen.simulation import building_run
-from msfp_gen.simulation.building_run import start_run, unpacked
 
 ROUNDING = 1e-12  # of sums of some ten terms that differ in the order of addition
 EVENTFUL = scene(frame(), duration=0.8)

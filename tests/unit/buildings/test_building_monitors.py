@@ -9,8 +9,8 @@ from support.buildings import BEARING, LOAD, rocking
 from msfp_gen import Auto, Effects, RunError, simulate
 from msfp_gen.buildings import scene as selection
 from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.buildings.run import start_run
 from msfp_gen.scene import effect_switching
-from msfp_gen.simulation.building_run import start_run
 from msfp_gen.simulation.start import RestartState
 
 

@@ -13,8 +13,8 @@ from support.buildings import BEARING, INTERFACE, LOAD, MOTION, frame, scene
 
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, InputError, Motion, RunError, simulate
 from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.buildings.run import result_of, start_run
 from msfp_gen.simulation import checkpoint
-from msfp_gen.simulation.building_run import result_of, start_run
 
 EVENTFUL = scene(frame(), duration=0.8)
 
@@ -65,11 +65,11 @@ def test_an_interrupted_run_is_resumed_bit_by_bit(tmp_path):
 def test_the_time_of_a_run_has_none_of_making_its_models(monkeypatch):
     """Of a run whose models are compiled it would be tens of seconds for one."""
 
-    def slow(*arguments: Any) -> Any:
+    def slow(*arguments: Any, **options: Any) -> Any:
         sleep(2.0)
-        return start_run(*arguments)
+        return start_run(*arguments, **options)
 
-    monkeypatch.setattr("msfp_gen.simulation.simulate.start_building", slow)
+    monkeypatch.setattr("msfp_gen.buildings.run.start_run", slow)
     assert 0 < simulate(replace(EVENTFUL, duration=0.02)).wall_time < 1.5
 
 
@@ -164,13 +164,13 @@ def test_where_the_building_does_not_converge_a_bearing_is_named():
 def test_a_run_that_fails_before_its_first_row_has_no_result(monkeypatch):
     """A result without rows would have no summary and no figure."""
 
-    def failed(made: BuildingScene, threads: int | None) -> Any:
+    def failed(made: BuildingScene) -> Any:
         compiled = SimpleNamespace(
             rows=(), row_count=0, status=("newton", 1, 0, 0.0), time=0.0, advance=lambda steps: False
         )
-        return SimpleNamespace(scene=made, run=compiled, time=0.0, status=compiled.status, switch=lambda: False)
+        return replace(start_run(made), run=compiled)
 
-    monkeypatch.setattr("msfp_gen.simulation.simulate.start_building", failed)
+    monkeypatch.setattr("msfp_gen.buildings.run.start_run", failed)
     with pytest.raises(RunError, match="bearing 1: stopped at t = 0 s") as caught:
         simulate(scene(frame()))
     assert caught.value.result is None

@@ -125,20 +125,17 @@ def test_messages_of_bad_bearings():
             BuildingBearing(BEARING, INTERFACE, effects=effects)
 
 
-OPTIONS = {
-    "strict": True, "gradients": ["motion.scale"], "energy_gradients": True,
-    "gradient_errors": False,
-}  # fmt: skip
+OPTIONS = {"strict": True, "gradients": ["motion.scale"], "energy_gradients": True}
 
 
 @pytest.mark.parametrize("option", [{name: value} for name, value in OPTIONS.items()], ids=OPTIONS)
 def test_options_of_a_bearing_are_rejected(option):
-    with pytest.raises(InputError, match=f"{next(iter(option))}: the run of a building has no such option"):
+    with pytest.raises(InputError, match=f"{next(iter(option))}: the run of this scene has no such option"):
         simulate(scene(frame()), **option)
 
 
 def test_the_option_of_a_building_is_rejected():
-    with pytest.raises(InputError, match="threads: the run of one bearing has no such option"):
+    with pytest.raises(InputError, match="threads: the run of this scene has no such option"):
         simulate(load_scene("fenz-test1"), threads=2)
 
 

@@ -33,9 +33,9 @@ from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.scene.friction_parameters import thermal_softening
 from msfp_gen.scene.scene_fields import InitialState, Stop
+from msfp_gen.simulation import bearing_run as simulation
 from msfp_gen.simulation import checkpoint
-from msfp_gen.simulation import simulate as simulation
-from msfp_gen.simulation.simulate import RunSequence
+from msfp_gen.simulation.bearing_run import BearingRun
 from msfp_gen.simulation.start import RestartState, start_run
 
 FULL = Effects()
@@ -323,8 +323,11 @@ def test_the_temperatures_of_the_monitor_are_those_of_the_law() -> None:
     scene = kumar()
     cold = replace(scene, bearing=scene.bearing.replace(temperature_ratio=1.0), effects=Auto(friction="pv"))
     full = simulate(replace(cold, effects=Effects(friction="pvt")))
-    run = RunSequence.of(cold)
-    run.run_segment()
+    run = BearingRun.of(cold)
+    run.begin()
+    while run.advance():
+        pass
+    run.end(run.status, 0.0)
     at = RestartState.of(run.segments[0].model, run.segments[0].run, 0.0)
     assert full.history.temperature is not None
     np.testing.assert_allclose(at.monitor_heat.sum(axis=1), full.history.temperature[-1] - 20.0, rtol=0.03)

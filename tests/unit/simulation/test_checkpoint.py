@@ -32,8 +32,8 @@ from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import replacing
 from msfp_gen.results.result import Result
 from msfp_gen.scene.scene_fields import Stop
+from msfp_gen.simulation import bearing_run as simulation
 from msfp_gen.simulation import checkpoint
-from msfp_gen.simulation import simulate as simulation
 from msfp_gen.simulation.start import start_run
 from msfp_gen.specification.contract import STATUSES, names
 
@@ -380,7 +380,7 @@ def test_an_altered_header_with_the_right_digest_is_refused_or_resumed(saved: Pa
 RUN = """
 import sys
 from pathlib import Path
-from msfp_gen.simulation import checkpoint, simulate as simulation
+from msfp_gen.simulation import bearing_run as simulation, checkpoint
 from msfp_gen.cli import main
 simulation.STEPS_PER_CALL, checkpoint.WRITE_INTERVAL = int(sys.argv[1]), 0
 sys.exit(main(sys.argv[2:]))

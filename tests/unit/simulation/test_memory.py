@@ -15,8 +15,8 @@ from support.resuming import assert_same
 from msfp_gen import Auto, InputError, Motion, RunError, simulate, simulate_batch
 from msfp_gen.cli import main
 from msfp_gen.results.result import Result
+from msfp_gen.simulation import bearing_run as simulation
 from msfp_gen.simulation import memory
-from msfp_gen.simulation import simulate as simulation
 
 
 def with_memory(monkeypatch: pytest.MonkeyPatch, size: float) -> None:

@@ -18,9 +18,10 @@ from msfp_gen.results.history import History
 from msfp_gen.results.joining import joined
 from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import EffectSelection
+from msfp_gen.simulation.bearing_run import BearingRun
 from msfp_gen.simulation.rows import Segment
-from msfp_gen.simulation.simulate import RunSequence
 from msfp_gen.simulation.start import start_run
+from msfp_gen.simulation.system import finish
 
 BEARING = presets.bearing("fenz-tfp")
 AUTO = Auto(dimension="planar", rims=True)  # three models: massless, inertial, and inertial with uplift
@@ -34,11 +35,10 @@ def with_effects(scene: Scene, **effects: Any) -> Scene:
     return again
 
 
-def ended(scene: Scene) -> tuple[RunSequence, Result]:
+def ended(scene: Scene) -> tuple[BearingRun, Result]:
     """All segments of a run, and its result."""
-    sequence = RunSequence.of(scene)
-    while sequence.effects is not None:
-        sequence.run_segment()
+    sequence = BearingRun.of(scene)
+    finish(sequence, scene.end)
     return sequence, sequence.result()
 
 

@@ -291,7 +291,7 @@ def test_a_run_that_fails_at_its_start_has_the_state_there(monkeypatch: pytest.M
     assert failed.status == caught.value.status and failed.message.startswith(str(caught.value))
     assert failed.status in ("irregular", "newton") and failed.history.time.tolist() == [0.0]
     # As of a state that is not finite.
-    monkeypatch.setattr("msfp_gen.simulation.simulate.finite_rows", lambda rows: rows[: len(rows) - 1])
+    monkeypatch.setattr("msfp_gen.simulation.bearing_run.finite_rows", lambda rows: rows[: len(rows) - 1])
     with pytest.raises(RunError, match=r"^scenes\[1\]: stopped at t = 0 s") as caught:
         simulate_batch([load_scene("fenz-test1"), stuck])
     assert caught.value.status == failed.status

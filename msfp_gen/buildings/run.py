@@ -18,7 +18,7 @@ from msfp_gen.buildings.spectra import Steps
 from msfp_gen.buildings.storey import FREEDOMS
 from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.cores import usable_cores
-from msfp_gen.common.errors import InputError, prefixed
+from msfp_gen.common.errors import InputError, RunError, prefixed
 from msfp_gen.embedding.two_port import DISSIPATED, compiled_port, scene_at_rest
 from msfp_gen.jit.build import load_driver
 from msfp_gen.model.compiled import AnyRun, Port
@@ -29,6 +29,7 @@ from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.scene.effect_switching import Ending, monitor_options, next_effects, stopping_monitors
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
+from msfp_gen.simulation.outcome import provenance_of, stopped
 from msfp_gen.simulation.start import RestartState, transferred_heights, transferred_state
 from msfp_gen.specification.contract import WORKS, names
 from msfp_gen.specification.layout import Auto, Effects
@@ -150,11 +151,12 @@ class Member:
         self.port.enter(at.time, q, v, f, ends, origin=origin, monitor_heat=at.monitor_heat, foot=foot, memory=memory)
 
 
+STEPS_PER_CALL = 20  # of the compiled run, without the GIL
 BEARINGS_OF_A_THREAD = 8  # fewer are not worth a thread
 MOTIONS, ENERGIES = ("displacement", "velocity", "acceleration"), ("damped", "received", "input")
 
 
-class Run(AnyRun, Protocol):
+class CompiledRun(AnyRun, Protocol):
     """`Run` of `compiled/msfp_building.pyx`."""
 
     @property
@@ -184,19 +186,20 @@ class Run(AnyRun, Protocol):
 
 @dataclass(eq=False)
 class BuildingRun:
-    """A compiled run and its parts.
+    """A run of a building, as of `simulation.system.Run`: one segment, in which bearings change their models.
 
     run: compiled. members: the bearings, which only the run steps. grounds: the different motions of the ground, that
     of the scene first. build: hash of all that determines the numbers beside the scene. changes: of the models of
     bearings, in order.
     """
 
-    run: Run
+    run: CompiledRun
     scene: BuildingScene
     members: list[Member]
     grounds: list[Motion]
     build: str
     changes: list[Change] = field(default_factory=list)
+    without_checkpoint = ""
 
     @property
     def time(self) -> float:
@@ -204,9 +207,33 @@ class BuildingRun:
         return self.run.time
 
     @property
-    def status(self) -> tuple[str, int, int, float]:
-        """Status as of `Run`."""
-        return self.run.status
+    def status(self) -> str:
+        """How the run stands."""
+        return self.run.status[0]
+
+    def begin(self) -> None:
+        """Nothing: the run has one segment, which `start_run` makes."""
+
+    def advance(self) -> bool:
+        """Take some steps, where needed with other models of bearings."""
+        return self.run.advance(STEPS_PER_CALL) or self.switch()
+
+    def end(self, status: str, wall: float) -> bool:
+        """Keep how the run ended."""
+        self._ended = status, wall
+        return False
+
+    def result(self, with_initial_row: bool = False) -> BuildingResult:
+        """The result; the message of a failed run names the bearing."""
+        (status, wall), (_, bearing, surface, value) = self._ended, self.run.status
+        message = ""
+        if status != "ok":
+            who = self.scene.label(bearing - 1) if bearing else "building"
+            message = f"{who}: {stopped(self.time, self.scene.end, status, surface, value)}"
+        if status != "ok" and not self.run.row_count:
+            raise RunError(message, status=status)
+        about = provenance_of(self.scene.solver, ", ".join(spec.key for spec in self.scene.specs))
+        return replace(result_of(self), provenance=about, status=status, message=message, wall_time=wall)
 
     @property
     def extremes(self) -> BuildingExtremes:
@@ -235,7 +262,7 @@ class BuildingRun:
 
         False: it has not (docs/effects.md).
         """
-        status, failed, surface, value = self.status
+        status, failed, surface, value = self.run.status
         if status == "ok" or not self.run.row_count:
             return False
         own = range(len(self.members)) if status == "monitor" else [failed - 1] if failed else []
@@ -291,7 +318,7 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
     attached = np.flatnonzero(np.any(scene.attachments, axis=(0, 1)))
     pieces = [snapped(ground.knots, ground.coefficients, grid.stops) for ground in grounds]
     module, key = load_driver("msfp_gen.buildings")
-    run: Run = module.Run(
+    run: CompiledRun = module.Run(
         (building.mass, building.damping, building.stiffness),
         attached,
         [member.port for member in members],
