@@ -95,6 +95,7 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, int held, 
     double a[FRICTION * FRICTION * LANES], newton[FRICTION * LANES], size[LANES], sum[LANES];
     const double *out = all->out, *tau = all->stage + MSFP_STAGE_TAU * LANES;
     int unconverged = 0, not_finite = 0;
+    (void)held; /* of a law alone */
     for (int s = 0; s < LANES; ++s)
         size[s] = sum[s] = 0.0;
     for (int r = 0; r < FRICTION; ++r)
