@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from msfp_gen.motions.prescribed import Rotation as Rotation
     from msfp_gen.results.result import Result as Result
     from msfp_gen.results.result import characterise as characterise
+    from msfp_gen.results.result import load_result as load_result
     from msfp_gen.scene.bearing import Bearing as Bearing
     from msfp_gen.scene.bearing import Body as Body
     from msfp_gen.scene.bearing import Surface as Surface
@@ -86,6 +87,7 @@ _MODULES = {
     "changed_scene": "scene.file.source",
     "characterise": "results.result",
     "fit": "studies.calibration",
+    "load_result": "results.result",
     "load_scene": "scene.file.source",
     "presets": "scene.file.presets",
     "simulate": "simulation.simulate",

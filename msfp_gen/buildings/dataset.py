@@ -21,7 +21,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.motions.motion import Motion
 from msfp_gen.results.dataset import ROWS as ONE_BEARING
 from msfp_gen.results.dataset import dataset_of_bearing
-from msfp_gen.results.files import COUNTER, attributes_of, motion_in, notes_in, without
+from msfp_gen.results.files import COUNTER, Storage, attributes_of, motion_in, notes_in, without
 from msfp_gen.results.history import ENERGY_BELOW, LABELS
 from msfp_gen.results.stored_group import Attribute, StoredGroup
 from msfp_gen.results.variables import (
@@ -331,3 +331,6 @@ def _scene(root: StoredGroup, about: Mapping[str, Attribute]) -> BuildingScene:
     matrices = _arrays_in(root, GROUP, MATRICES, sizes)
     motions = [motion_in(root, ground_name(index)) for index in range(int(table.get("grounds", 1)))]
     return scene_from(text, matrices, motions)
+
+
+STORAGE = Storage(to_dataset, arrays_of, columns, edition, fields_in, groups_of, DERIVED)

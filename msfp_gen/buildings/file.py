@@ -220,4 +220,10 @@ def _with_files(table: Mapping[str, Any]) -> Iterator[tuple[str, Table, tuple[st
             yield f"building.bearing[{i}].motion", row["motion"], MOTION_PATHS
 
 
-BUILDING = Kind("building", building_from_table, _with_files, COMMON, files(__package__) / "presets")
+def _result() -> Any:
+    from msfp_gen.buildings.result import BuildingResult
+
+    return BuildingResult
+
+
+BUILDING = Kind("building", building_from_table, _with_files, COMMON, files(__package__) / "presets", _result)

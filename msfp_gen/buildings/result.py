@@ -19,7 +19,7 @@ from msfp_gen.buildings.spectra import FloorSpectra, Steps, floor_spectra
 from msfp_gen.buildings.summary import BuildingCharacterisation
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
-from msfp_gen.results.files import Storage
+from msfp_gen.results.files import OF_BUILDING, Storage
 from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Event, Extremes, by_axis
 from msfp_gen.results.note import Note
 from msfp_gen.results.result import AnyResult, Curve, OneBearing, Rows
@@ -68,7 +68,7 @@ class BuildingResult(AnyResult):
     """
 
     source: ClassVar[str] = "msfp-gen building"
-    storage: ClassVar[Storage] = building_dataset
+    storage: ClassVar[Storage] = building_dataset.STORAGE
     scene: BuildingScene
     time: Array
     displacement: Array
@@ -360,7 +360,7 @@ class BearingResult(OneBearing):
     compression at rest [N]. events: none, since the run of a building does not record events.
     """
 
-    source: ClassVar[str] = "msfp-gen bearing"
+    source: ClassVar[str] = OF_BUILDING
     building: BuildingResult
     index: int
     history: BearingRows

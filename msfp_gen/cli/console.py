@@ -24,13 +24,10 @@ from msfp_gen.results.sign import SIGNS
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.common.tables import Table
-    from msfp_gen.results.result import Result
+    from msfp_gen.results.result import AnyResult
     from msfp_gen.results.verdict import Verdict
     from msfp_gen.scene.system import System
-
-    AnyResult = Result | BuildingResult
 
 
 def parser_of(kind: Callable[[str], Any], noun: str) -> Callable[[str], Any]:
@@ -220,12 +217,10 @@ def building(kept: bool = True) -> Iterator[Callable[[str, float], None]]:
 def load_source(source: str) -> AnyResult | System:
     """Load a saved result (.nc), or the scene of a file or preset, of one bearing or of a building."""
     if source.lower().endswith(".nc"):
-        from msfp_gen.buildings.result import BuildingResult
-        from msfp_gen.results.files import read_result
-        from msfp_gen.results.result import Result
+        from msfp_gen.results.result import load_result
 
-        result: Any = read_result(source, Result, BuildingResult)
-        return result  # type: ignore[no-any-return]
+        result: AnyResult = load_result(source)
+        return result
     from msfp_gen.scene.file.source import load_scene
 
     scene: System = load_scene(source)
@@ -239,18 +234,13 @@ def is_result(loaded: object) -> bool:
     return isinstance(loaded, ResultFiles)
 
 
-def of_building(loaded: object) -> bool:
-    """Whether this is the scene or the result of a building."""
-    from msfp_gen.buildings.result import BuildingResult
-    from msfp_gen.buildings.scene import BuildingScene
-
-    return isinstance(loaded, BuildingScene | BuildingResult)
-
-
 def one_bearing(loaded: Any, what: str) -> Any:
-    """A scene or result of one bearing. Raises InputError that begins with `what` for one of a building."""
-    if of_building(loaded):
-        raise InputError(f"{what}: this is a building; leave it out, or give a scene or result of one bearing")
+    """A scene or result of one bearing. Raises InputError that begins with `what` for another system."""
+    from msfp_gen.results.result import Result
+    from msfp_gen.scene.scene import Scene
+
+    if not isinstance(loaded, Scene | Result):
+        raise InputError(f"{what}: this has more than one bearing; leave it out, or give one bearing alone")
     return loaded
 
 

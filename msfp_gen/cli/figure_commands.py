@@ -25,7 +25,7 @@ from msfp_gen.results.sign import DEFAULT, sign_of
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from msfp_gen.cli.console import AnyResult
+    from msfp_gen.results.result import AnyResult
     from msfp_gen.scene.system import System
 
 EVERY = "all"

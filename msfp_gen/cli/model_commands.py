@@ -16,7 +16,6 @@ from msfp_gen.cli.console import (
     load_source,
     note,
     number,
-    of_building,
     result_of,
     say,
     scenes,
@@ -258,13 +257,15 @@ def export(
 def _export_rows(source: str, output: Path, columns: str | None, sign: str) -> None:
     from msfp_gen.common.tables import TABLE_SUFFIXES
     from msfp_gen.results.files import export_columns
+    from msfp_gen.results.result import Result
+    from msfp_gen.scene.scene import Scene
 
     check_output(output, TABLE_SUFFIXES, "--output")
     names = None if columns is None else [name.strip() for name in columns.split(",")]
     sign_of(sign, "--sign")
     loaded = load_source(source)
-    if of_building(loaded) and sign != DEFAULT:
-        raise InputError(f"--sign = {sign!r}: columns of a building have one sign, base - top; leave it out")
+    if sign != DEFAULT and not isinstance(loaded, Scene | Result):
+        raise InputError(f"--sign = {sign!r}: the columns of this run have one sign, base - top; leave it out")
     result, failure = result_of(loaded)
     note(f"wrote {export_columns(result, output, names, sign)}")
     if failure is not None:

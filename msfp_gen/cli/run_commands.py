@@ -33,7 +33,7 @@ from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
-    from msfp_gen.cli.console import AnyResult
+    from msfp_gen.results.result import AnyResult
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.system import System
     from msfp_gen.studies.accuracy.error_target import Within

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.common.errors import InputError
-from msfp_gen.results.files import COUNTER, REMEDY, WORDS, attributes_of, motion_in, notes_in, without
+from msfp_gen.results.files import COUNTER, REMEDY, WORDS, Storage, attributes_of, motion_in, notes_in, without
 from msfp_gen.results.history import (
     ENERGY,
     ENERGY_BELOW,
@@ -291,3 +291,6 @@ def groups_of(result: RunData) -> dict[str, xr.Dataset]:
 
     motion = {GROUP: to_pieces(result.scene.motion)} if needs_pieces(result.scene) else {}
     return motion | ({} if result.gradients is None else {GRADIENT: gradient_group(result)})
+
+
+STORAGE = Storage(to_dataset, arrays_of, columns, edition, fields_in, groups_of)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -35,40 +35,34 @@ if TYPE_CHECKING:
 COUNTER, PROVENANCE = "counter_", "provenance_"  # prefixes of the attributes with counters and provenance
 EDITION = "edition"  # attribute: of the names in a file; that of another version of msfp-gen differs if these do
 WORDS = ("scene", "motion", "status", "message", "notes")  # attributes that are texts
-KINDS = {  # of results, by the attribute `source`: what they are of, and how they are read
-    "msfp-gen": "one bearing; read it with Result.from_netcdf",
-    "msfp-gen building": "a building; read it with BuildingResult.from_netcdf",
-    "msfp-gen bearing": "one bearing of a building; read the file of the building, which has it in its bearings",
-}
 # What h5py, json, tomllib and NumPy raise for content that they cannot read.
 DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
 REMEDY = "give a file that `run -o` wrote"
-F = TypeVar("F", bound="ResultFiles")
+OF_BUILDING = "msfp-gen bearing"  # attribute `source` of the file of one bearing of a building
 
 
-class Storage(Protocol):
-    """A module that makes the dataset of one kind of result, and reads its files."""
+@dataclass(frozen=True)
+class Storage:
+    """What makes the dataset of one kind of result, and reads its files.
 
-    def to_dataset(self, result: Any) -> xr.Dataset:
-        """The dataset of a result."""
+    Attributes:
+        to_dataset: the dataset of a result.
+        arrays_of: the arrays of a result of which the variables of the dataset are parts, by field.
+        columns: of a scene, the columns of an exported table, each with its variable and its index in that.
+        edition: a digest of the names that a file of this version has.
+        fields_in: the fields of a result from an opened file and its attributes, except status, message and provenance.
+            Raises InputError, or what `DAMAGE` lists.
+        groups_of: the groups of the netCDF-4 file of a result beside the dataset, by name.
+        derived: variables of the dataset that follow from the others: they are written but not read.
+    """
 
-    def arrays_of(self, result: Any) -> Arrays:
-        """The arrays of which the variables of the dataset are parts, by field."""
-
-    def columns(self, scene: Any) -> Places:
-        """The columns of an exported table, each with its variable and its index in that."""
-
-    def groups_of(self, result: Any) -> dict[str, xr.Dataset]:
-        """The groups of the netCDF-4 file beside the dataset, by name."""
-
-    def edition(self) -> str:
-        """A digest of the names that a file of this version has."""
-
-    def fields_in(self, root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, Any]:
-        """The fields of the result from a file, except status, message and provenance.
-
-        about: attributes of the file. Raises InputError, or what `DAMAGE` lists.
-        """
+    to_dataset: Callable[[Any], xr.Dataset]
+    arrays_of: Callable[[Any], Arrays]
+    columns: Callable[[Any], Places]
+    edition: Callable[[], str]
+    fields_in: Callable[[StoredGroup, dict[str, Attribute]], dict[str, Any]]
+    groups_of: Callable[[Any], dict[str, xr.Dataset]]
+    derived: Collection[str] = ()
 
 
 class ResultFiles:
@@ -202,11 +196,6 @@ class ResultFiles:
         """Write the format of the suffix: .nc, .parquet, .csv or .mat. Raises InputError as the other writers do."""
         target = check_result_path(path)
         return WRITERS[target.suffix.lower()](self, target)
-
-    @classmethod
-    def from_netcdf(cls, path: str | Path) -> Self:
-        """The result in a file that `to_netcdf` wrote, its scene included. Raises InputError for any other file."""
-        return read_result(path, cls)
 
 
 WRITERS: dict[str, Callable[..., Path]] = {
@@ -355,14 +344,17 @@ def _is_read(name: str) -> bool:
     return name in (*WORDS, "source", EDITION, "extremes", "fidelity") or name.startswith((COUNTER, PROVENANCE))
 
 
-def read_result(path: str | Path, *kinds: type[F]) -> F:
-    """The result in a file of `to_netcdf`, as an instance of that one of `kinds`. Raises InputError for other files."""
+def read_result(path: str | Path, kind_of: Callable[[str], Any]) -> Any:
+    """The result in a file of `to_netcdf`. kind_of: class of results, by the attribute `source`; None: there is none.
+
+    Raises InputError for other files.
+    """
     path = Path(path)
     try:
         if not path.is_file():
             raise InputError("no such file; give the name of a result")
         with stored_groups(path) as root:
-            return _result_in(root, kinds)
+            return _result_in(root, kind_of)
     except InputError as error:
         raise InputError(f"path = {str(path)!r}: {error}") from None
     except DAMAGE as error:
@@ -371,13 +363,13 @@ def read_result(path: str | Path, *kinds: type[F]) -> F:
         raise InputError(f"path = {str(path)!r}: this result does not fit into memory; free some") from None
 
 
-def _result_in(root: StoredGroup, kinds: Sequence[type[F]]) -> F:
+def _result_in(root: StoredGroup, kind_of: Callable[[str], Any]) -> Any:
     about = root.attributes(_is_read)
-    source, edition = about.pop("source", None), about.pop(EDITION, None)
-    kind = next((kind for kind in kinds if kind.source == source and hasattr(kind, "storage")), None)
-    if kind is None:
-        what = f"this is the result of {KINDS[str(source)]}" if source in KINDS else f"no result of msfp-gen; {REMEDY}"
-        raise InputError(what)
+    source, edition = str(about.pop("source", None)), about.pop(EDITION, None)
+    if source == OF_BUILDING:
+        raise InputError("this is the result of one bearing of a building; give the file of the building, which has it")
+    if (kind := kind_of(source)) is None:
+        raise InputError(f"no result of msfp-gen; {REMEDY}")
     try:
         return _read(root, about, kind)
     except (InputError, *DAMAGE) as error:
@@ -389,7 +381,7 @@ def _result_in(root: StoredGroup, kinds: Sequence[type[F]]) -> F:
         raise
 
 
-def _read(root: StoredGroup, about: dict[str, Attribute], kind: type[F]) -> F:
+def _read(root: StoredGroup, about: dict[str, Attribute], kind: Any) -> Any:
     if not all(isinstance(about.get(name), str) for name in WORDS):
         raise ValueError(f"an attribute of {', '.join(WORDS)} is no text")
     fields = kind.storage.fields_in(root, about)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from msfp_gen.common.tables import Table
 from msfp_gen.results import dataset
 from msfp_gen.results.characterise import Characterisation
 from msfp_gen.results.characterise import characterise as characterise_bearing
-from msfp_gen.results.files import ResultFiles, Storage
+from msfp_gen.results.files import ResultFiles, Storage, read_result
 from msfp_gen.results.note import by_importance
 from msfp_gen.results.run_data import BearingData, RunData
 from msfp_gen.results.summary import (
@@ -30,6 +31,7 @@ from msfp_gen.results.summary import (
     work_rows,
 )
 from msfp_gen.results.verdict import Verdict, verdict_of
+from msfp_gen.scene.system import kinds
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -184,7 +186,7 @@ class Result(OneBearing, RunData):
     options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
     """
 
-    storage: ClassVar[Storage] = dataset
+    storage: ClassVar[Storage] = dataset.STORAGE
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -245,3 +247,18 @@ def characterise(result: Any) -> Any:
     if not isinstance(result, AnyResult):
         raise InputError(f"result: this is a {type(result).__name__}; give the result of simulate(scene)")
     return result.characterise()
+
+
+def load_result(path: str | Path) -> Any:
+    """The result in a file that `save` wrote as netCDF: a `Result`, or that of another system, such as of a building.
+
+    Raises InputError of one line that names the file and the remedy for any other file.
+    """
+    return read_result(path, _kind_of)
+
+
+def _kind_of(source: str) -> Any:
+    if source == Result.source:
+        return Result
+    results = (kind.result() for kind in kinds().values() if kind.result is not None)
+    return next((result for result in results if result.source == source), None)

@@ -216,9 +216,9 @@ class RunData(BearingData):
         return rows if self.recorded_extremes is None else rows | self.recorded_extremes
 
     def over_steps(self, word: str, field: str) -> Array | None:
-        """An extreme of a field of the history over all steps; None where the run records none.
+        """An extreme of a field of the history over all steps, ndarray, shape (m,), [SI]; None: it is not recorded.
 
-        word: "peak", "least" or "most".
+        word: "peak", "least" or "most". m: the columns of the field.
         """
         name = OVER_STEPS.get((word, field))
         return None if name is None else getattr(self.extremes, name)

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import InitVar, dataclass
 from dataclasses import fields as dataclass_fields
 from dataclasses import replace as dataclass_replace
-from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from msfp_gen.specification.layout import Layout
 from msfp_gen.specification.values import Bound, rules
 
 if TYPE_CHECKING:
-    from msfp_gen.scene.top import NodeTop
+    pass
 
 _BODY = rules(contract.BODY)
 _SURFACE = rules((*contract.EVERY_SURFACE, *contract.NUMBERS.values()))
@@ -252,11 +251,6 @@ class Bearing:
                 sheet[index] = (moment - inner_moment) / (arm - inner_arm)
                 inner_arm, inner_moment = arm, moment
         return tuple(sheet)
-
-    def two_port(self, interface: NodeTop, axial_load: float | None = None, **parts: Any) -> Any:
-        """The bearing between two moving ends: `TwoPort(self, interface, axial_load, **parts)`, with its errors."""
-        # What this shortcut makes lies above this package, so it is found by its public name when it is called.
-        return import_module("msfp_gen").TwoPort(self, interface, axial_load, **parts)
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
         """All values as float64 arrays.

@@ -134,6 +134,7 @@ class Kind:
         files: place, table and keys of every table of a file that may name files.
         common: tables inside the table `key` that its rows have unless they have their own.
         presets: folder of TOML files with systems of this kind; None: there are none.
+        result: gives the class of their results, for files of results; None: there are no such files.
     """
 
     key: str
@@ -141,6 +142,7 @@ class Kind:
     files: Callable[[Mapping[str, Any]], Iterator[tuple[str, Table, tuple[str, ...]]]]
     common: tuple[str, ...] = ()
     presets: Traversable | None = None
+    result: Callable[[], Any] | None = None
 
 
 def is_system(value: object) -> bool:

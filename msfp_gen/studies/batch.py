@@ -318,7 +318,9 @@ def completed_runs(
         calls = ((i, (labels[i], scenes[i], strict, None if shared is None else shared.of(i), threads)) for i in order)
         with local_pool(count, processes) as pool:
             for index, result in pool.results(_run, calls):
-                yield index, result if isinstance(result, RunError) else replace(result, scene=scenes[index])
+                if processes and not isinstance(result, RunError) and type(result.scene) is type(scenes[index]):
+                    result = replace(result, scene=scenes[index])  # the one of the caller, not a copy
+                yield index, result
                 del result
 
     return results()

@@ -24,8 +24,7 @@ from msfp_gen.studies.axes import Axis, Recipe, SceneFactory, located, motion_of
 from msfp_gen.studies.columns import plain_cell
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.result import BuildingResult
-    from msfp_gen.results.result import Result
+    from msfp_gen.results.result import AnyResult
     from msfp_gen.scene.file.loader import SuiteRecord
 
 MAX_SCENES = 100_000  # of one sweep; more scenes are taken to be a typing error
@@ -112,7 +111,7 @@ class Row(NamedTuple):
         return {**about, **self.summary}
 
 
-def row_of(number: int, variation: Variation, result: Result | BuildingResult | RunError, file: Path | None) -> Row:
+def row_of(number: int, variation: Variation, result: AnyResult | RunError, file: Path | None) -> Row:
     """The row of a run, without its result. result: of the run, or its RunError where it failed before a first row."""
     if not isinstance(result, RunError):
         return Row(number, variation, result.summary, "" if file is None else file.name)

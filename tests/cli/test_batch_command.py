@@ -23,7 +23,7 @@ from msfp_gen import InputError, RunError, Scene, changed_scene, load_scene, sim
 from msfp_gen.cli import main
 from msfp_gen.cli.console import signals_as_interrupts
 from msfp_gen.motions import records
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import load_result
 from msfp_gen.studies import batch
 from msfp_gen.studies.batch import completed_runs
 from msfp_gen.studies.sweep import row_of, sweep_table, variations, varied_field, write_table
@@ -40,7 +40,7 @@ def test_runs_and_table_are_written(tmp_path: Any, capsys: pytest.CaptureFixture
     rows = list(csv.DictReader(StringIO(table.read_text(encoding="utf-8"))))
     assert [row["file"] for row in rows] == names
     for row in rows:
-        kept = Result.from_netcdf(folder / row["file"])
+        kept = load_result(folder / row["file"])
         alone = simulate(changed_scene(row["scene"], {"solver.rtol": float(row["solver.rtol"])}))
         assert float(row["peak_displacement [m]"]) == alone.summary["peak_displacement"]["radial"]
         assert float(row["minimum_gap_3 [m]"]) == alone.summary["minimum_gap"][2] == kept.summary["minimum_gap"][2]
@@ -212,7 +212,7 @@ def test_ctrl_c_keeps_what_has_ended(tmp_path: Any) -> None:
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130 and "1 of 2 runs had ended and are kept" in err, err
     assert [path.name for path in tmp_path.glob("runs/*")] == ["1-fenz-test1.nc"]
-    assert Result.from_netcdf(tmp_path / "runs" / "1-fenz-test1.nc").status == "ok"
+    assert load_result(tmp_path / "runs" / "1-fenz-test1.nc").status == "ok"
     assert [run["source"] for run in json.loads(out)] == ["fenz-test1"]
     assert [row["scene"] for row in csv.DictReader(StringIO(Path(table).read_text(encoding="utf-8")))] == ["fenz-test1"]
 

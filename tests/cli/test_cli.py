@@ -16,7 +16,7 @@ from msfp_gen.cli.console import Progress
 from msfp_gen.cli.run_commands import DEMO
 from msfp_gen.common.errors import CompileError, RunError
 from msfp_gen.jit.build import BuildInfo
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import load_result
 
 
 @pytest.fixture
@@ -136,7 +136,7 @@ def test_run_prints_tables_and_writes_what_was_asked_for(capsys, simulated, tmp_
     assert surface == ["4", "65.10", "65.00", "-0.10", "yes", "112.000", "112.000"]
     assert err == f"wrote {data}\nwrote {picture}\n"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.nc", "run.png"]
-    assert Result.from_netcdf(data).scene == simulated[0]
+    assert load_result(data).scene == simulated[0]
 
 
 def test_run_prints_the_summary_as_json_and_nothing_else(capsys, simulated):
@@ -177,7 +177,7 @@ def test_failed_run_keeps_what_was_computed(capsys, failing, tmp_path):
     assert "newton_failed" in out
     assert err.startswith("error: t = 3 s, surface 2: Newton did not converge; give a smaller max_step")
     assert err.count("\n") == 1 and str(data) in err and str(picture) in err
-    assert Result.from_netcdf(data).status == "newton_failed"
+    assert load_result(data).status == "newton_failed"
 
 
 def test_failed_run_without_output_writes_nothing(capsys, failing, tmp_path, monkeypatch):
@@ -351,7 +351,7 @@ def test_real_run_from_scene_to_files(capsys, tmp_path):
     assert summary["peak_displacement"]["radial"] == pytest.approx(0.025, rel=0.01)
     assert summary["peak_force_ratio"] == pytest.approx(0.083, abs=0.002)
     assert summary["rims_met"] == [] and summary["energy"]["closure_error"] < 2e-3
-    assert Result.from_netcdf(data).summary == summary
+    assert load_result(data).summary == summary
     assert picture.read_text(encoding="utf-8").startswith("<?xml")
 
 

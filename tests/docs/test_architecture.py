@@ -105,6 +105,30 @@ def test_packages_import_downward():
     assert not back, back
 
 
+# What derives, emits, builds and runs; the packages above it are its guests.
+CORE = (
+    "common", "specification", "generator", "templates", "runtime", "jit", "motions", "scene", "model", "results",
+    "simulation",
+)  # fmt: skip
+
+
+def test_the_core_imports_no_satellite():
+    """Imports in functions, for types, and of a module that a text names count."""
+    for name, path in MODULES.items():
+        if name.count(".") and name.split(".")[1] in CORE:
+            above = [other for other in ours(path, late=True) if other.split(".")[1] not in CORE]
+            assert not above, f"{name} imports {above}"
+            assert "import_module" not in ast.dump(tree_of(path)), f"{name} imports a module that a text names"
+
+
+def test_a_run_loads_the_core_alone():
+    code = "import sys, msfp_gen; msfp_gen.simulate(msfp_gen.load_scene('fenz-test2')); print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    packages = {name.split(".")[1] for name in loaded if name.startswith("msfp_gen.")}
+    assert packages <= set(CORE), packages - set(CORE)
+    assert not (HEAVY - {"pydantic"}) & set(loaded)
+
+
 def test_no_modules_import_each_other_in_a_circle():
     """Imports for types and in functions count between packages; in one package a class may call what knows it."""
     left = {

@@ -20,7 +20,7 @@ from support.random_states import inputs, sensible
 from msfp_gen import Effects, InputError, Layout, Motion, RunError, Scene, Solver, build_model, simulate
 from msfp_gen.generator import generate
 from msfp_gen.jit.build import runtime_sources
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import Result, load_result
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
 from msfp_gen.scene.friction_parameters import coefficient
 from msfp_gen.specification.friction_laws import (
@@ -332,14 +332,14 @@ def test_results_and_scenes_come_back(tmp_path: Any) -> None:
     import tomllib
 
     assert scene_from_table(tomllib.loads(text)).bearing == run.scene.bearing
-    again = Result.from_netcdf(run.to_netcdf(tmp_path / "run.nc"))
+    again = load_result(run.to_netcdf(tmp_path / "run.nc"))
     assert again.scene.effects == run.scene.effects
     assert (again.history.temperature == run.history.temperature).all()
     assert (again.history.friction_coefficient == run.history.friction_coefficient).all()
     assert run.dataset["temperature"].attrs["units"] == "degC" and "friction_coefficient" in run.dataset
     cold = simulate(scene_of("fenz-test2", duration=1.0))
     assert "temperature" not in cold.dataset and cold.to_netcdf(tmp_path / "cold.nc")
-    assert Result.from_netcdf(tmp_path / "cold.nc").history.temperature is None
+    assert load_result(tmp_path / "cold.nc").history.temperature is None
 
 
 def test_constant_friction_emits_nothing_of_a_law() -> None:
@@ -379,7 +379,7 @@ def test_friction_by_the_path_of_sliding(method: str, tmp_path: Path) -> None:
     want = mu * (1 - 0.3 * (1 - np.exp(-rows.memory / 0.05)))
     assert np.abs(rows.friction_coefficient / want - 1).max() < 1e-6
     assert run.dataset["memory"].dims == ("time", "surface")
-    assert Result.from_netcdf(run.to_netcdf(tmp_path / "run.nc")).history.memory == pytest.approx(rows.memory)
+    assert load_result(run.to_netcdf(tmp_path / "run.nc")).history.memory == pytest.approx(rows.memory)
 
 
 def test_a_law_takes_one_memory() -> None:

@@ -378,7 +378,14 @@ class _Search:
             close = index not in self.references and reference is not None and reference.rtol > 0.2 * trial.rtol
             factor = 2 * SAFETY if close else SAFETY
             estimate = factor * largest_error(differences)
+            if self.filtered and (ringing := self._error_of_ringing(index)) <= self.target:
+                estimate = max(estimate, ringing)
         return Attempt(trial.method, trial.rtol, trial.seconds, trial.newton, estimate, differences, trial.status)
+
+    def _error_of_ringing(self, index: int) -> float:
+        """Estimated error of a run against the one that resolves undamped ringing; infinite where that did not end."""
+        found = errors(self.trial(index), self.resolved) if self.resolved.finished else None
+        return float("inf") if found is None else SAFETY * largest_error(found)
 
     def next_step(self, index: int) -> Attempt | None:
         """The attempt at the next tighter tolerance, run where needed; None if there is no time for it."""
@@ -412,7 +419,7 @@ class _Search:
 
     def left_out(self, index: int) -> str:
         """Ringing that no estimate of the search includes, with its effect on this scene, as text; "" if none."""
-        if not self.filtered:
+        if not self.filtered or self._error_of_ringing(index) <= self.target:
             return ""
         resolved, found = self.resolved, errors(self.trial(index), self.resolved)
         words = (

@@ -10,6 +10,7 @@ from msfp_gen import Auto, Effects, RunError, simulate
 from msfp_gen.buildings import scene as selection
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.run import start_run
+from msfp_gen.results.result import load_result
 from msfp_gen.scene import effect_switching
 from msfp_gen.simulation.start import RestartState
 
@@ -75,7 +76,7 @@ def test_changes_of_models_and_peaks_are_in_the_file(tmp_path):
     assert {note.action for note in notes} == {"uplift = True"}
     heat = np.diff(found.dissipated, axis=0)  # the integrals of a new model begin anew; the sum goes on
     assert heat.min() >= -1e-9 * found.dissipated.max()
-    read = BuildingResult.from_netcdf(found.to_netcdf(tmp_path / "out.nc"))
+    read = load_result(found.to_netcdf(tmp_path / "out.nc"))
     assert same(found, read) and read.summary == found.summary and read.notes == found.notes
 
 

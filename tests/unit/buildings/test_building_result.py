@@ -25,13 +25,14 @@ from msfp_gen.results.joining import at_times
 from msfp_gen.results.loops import ForcePath as Motions
 from msfp_gen.results.note import Note
 from msfp_gen.results.quantities import quantities
+from msfp_gen.results.result import load_result
 from msfp_gen.results.summary import summary_of_bearing
 from msfp_gen.scene.fidelity import Backbone, at_fidelity
 
 
 def test_the_note_of_a_cheaper_model_is_read_from_the_file(tmp_path: Path):
     run = simulate(at_fidelity(replace(pushed_scene(), duration=0.05), "rigid"))
-    read = BuildingResult.from_netcdf(run.to_netcdf(tmp_path / "run.nc"))
+    read = load_result(run.to_netcdf(tmp_path / "run.nc"))
     assert "fidelity" in {note.kind for note in run.notes}
     assert read.notes == run.notes and read.scene.fidelity == "rigid"
 
@@ -103,8 +104,8 @@ def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
     assert all(plot(one) for plot in (plot_result, plot_loops, plot_orbit, plot_sliding))
     file = one.save(tmp_path / "one.nc")
     assert opened(file).identical(one.dataset)
-    with pytest.raises(InputError, match="one bearing of a building; read the file of the building"):
-        BuildingResult.from_netcdf(file)
+    with pytest.raises(InputError, match="one bearing of a building; give the file of the building"):
+        load_result(file)
 
 
 def test_a_file_without_extremes_is_refused(tmp_path: Path):
@@ -112,7 +113,7 @@ def test_a_file_without_extremes_is_refused(tmp_path: Path):
     with h5py.File(path, "r+") as file:
         del file["extremes"]
     with pytest.raises(InputError, match=r"frame\.nc.*the group extremes is missing"):
-        BuildingResult.from_netcdf(path)
+        load_result(path)
 
 
 def test_columns_of_a_scene_are_those_of_its_pushed():
@@ -177,7 +178,7 @@ def test_dataset_states_signs_and_is_addressed_by_names():
 
 
 def test_the_scene_of_a_file_runs_again(tmp_path: Path):
-    read = BuildingResult.from_netcdf(pushed().to_netcdf(tmp_path / "frame.nc"))
+    read = load_result(pushed().to_netcdf(tmp_path / "frame.nc"))
     assert read.scene.modelled == pushed_scene().modelled and read.scene.motion == pushed_scene().motion
     assert np.array_equal(simulate(read.scene).wrench, pushed().wrench)
 
@@ -289,7 +290,7 @@ def test_motions_of_supports_come_back_from_a_file(tmp_path: Path):
     given = pushed_scene()
     own = [replace(each, motion=MOTION) if each.name else each for each in given.bearings]
     found = simulate(replace(given, bearings=own, duration=0.2))
-    read = BuildingResult.from_netcdf(found.save(tmp_path / "frame.nc"))
+    read = load_result(found.save(tmp_path / "frame.nc"))
     assert [each.motion == MOTION for each in read.scene.bearings] == [True, True, False, False]
     assert read.scene.bearings[2].motion is None and np.array_equal(read.support, found.support)
     assert read.summary == found.summary

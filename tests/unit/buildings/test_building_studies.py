@@ -14,6 +14,7 @@ import pytest
 from msfp_gen import Auto, BuildingScene, Effects, InputError, bound, changed_scene, simulate, simulate_batch, study
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.cli import main
+from msfp_gen.results.result import load_result
 from msfp_gen.studies.bounding import bounded_scenes, load_factors
 from msfp_gen.studies.bounding.runs import bounded_scene, bounding_tables, plot_bounds, write_quantities
 from msfp_gen.studies.definition import load_study
@@ -241,7 +242,7 @@ def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.Cap
     out = tmp_path / "out.nc"
     assert main(["run", str(path), "-o", str(out), "--plot", str(tmp_path / "plot.png"), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed["peak_force"] == BuildingResult.from_netcdf(out).summary["peak_force"]
+    assert printed["peak_force"] == load_result(out).summary["peak_force"]
     assert main(["explain", str(path)]) == 0 and "all bearings: effects selected" in capsys.readouterr().out
     assert main(["characterise", str(out)]) == 0 and "isolation system of slab" in capsys.readouterr().out
     assert main(["plot", str(out), "--figure", "plan", "-o", str(tmp_path / "plan.svg")]) == 0
@@ -255,11 +256,11 @@ def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.Cap
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["run", "--error", "1%"], "--error = 0.01: this is a building"),
+        (["run", "--error", "1%"], "--error = 0.01: this has more than one bearing"),
         (["animate", "-o", "x.gif", "--end", "9"], "time = 9 s: the run holds 0 to 0.24 s"),
         (["fit", "test.csv", "--parameters", "bearing.friction"], "give a scene of one bearing here"),
         (["plot", "--figure", "loops"], "--figure = 'loops': give one of overview, plan"),
-        (["export", "-o", "x.csv", "--sign", "top-base"], "columns of a building have one sign"),
+        (["export", "-o", "x.csv", "--sign", "top-base"], "the columns of this run have one sign"),
     ],
 )
 def test_what_a_building_has_not_is_said_in_one_line(path, arguments, words, capsys, tmp_path, monkeypatch):

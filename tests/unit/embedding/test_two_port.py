@@ -278,12 +278,6 @@ def test_an_unloaded_bearing_takes_up_its_load():
     assert found == pytest.approx(-LOAD, rel=1e-4)
 
 
-def test_the_bearing_makes_its_two_port():
-    two_port = BEARING.two_port(INTERFACE, axial_load=LOAD)
-    assert isinstance(two_port, TwoPort)
-    assert np.array_equal(advance(two_port, 0, 3, STEP), advance(port(), 0, 3, STEP))
-
-
 def test_both_implicit_methods_agree():
     found = [advance(port(1e-6, method=method), 0, 30, STEP) for method in ("implicit", "esdirk4")]
     assert np.abs(found[0] - found[1]).max() < 1e-3 * LOAD

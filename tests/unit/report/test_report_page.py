@@ -22,7 +22,7 @@ from msfp_gen.report.frames import instants, main_direction, packed, pieces, sel
 from msfp_gen.report.page import BEARING, TERMS, provenance_table
 from msfp_gen.results.geometry import poses
 from msfp_gen.results.note import Note
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import load_result
 from msfp_gen.scene.explain import explain
 
 
@@ -42,7 +42,7 @@ def saved(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def page(saved):
-    return report_html(Result.from_netcdf(saved))
+    return report_html(load_result(saved))
 
 
 class Parts(HTMLParser):
@@ -72,7 +72,7 @@ def unpacked(array):
 
 def test_numbers_are_those_of_the_data_file(saved, page):
     """Peaks are over all steps of the run, which the file keeps; they exceed those of its rows by very little."""
-    data, summary = opened(saved), Result.from_netcdf(saved).summary
+    data, summary = opened(saved), load_result(saved).summary
     u, force = data["displacement"].values, data["top_force"].values
     for value, peak in (
         (np.hypot(u[:, 0], u[:, 1]).max(), summary["peak_displacement"]["radial"]),
@@ -95,7 +95,7 @@ def test_page_asks_for_no_other_file(page):
 
 
 def test_title_block_and_terms(saved, tmp_path):
-    result = Result.from_netcdf(saved)
+    result = load_result(saved)
     path = tmp_path / "a.html"
     words = ["--project", "Block <B>", "--date", "2026-03-01", "--revision", "2", "--code", "ASCE 7-22"]
     assert main(["report", str(saved), "-o", str(path), *words]) == 0
@@ -125,7 +125,7 @@ def test_every_number_of_the_settings_has_its_unit():
 
 def test_page_is_the_same_on_every_machine(page, saved):
     """No wall time, no build time, no folder; and the same file gives the same page."""
-    result = Result.from_netcdf(saved)
+    result = load_result(saved)
     slower = dataclasses.replace(
         result,
         counters=dataclasses.replace(result.counters, wall_time=1e3),
@@ -253,7 +253,7 @@ def test_motion_from_python_or_a_file_comes_back_without_its_file(tmp_path):
         scene = dataclasses.replace(loops().scene, motion=motion, motion_table=given, duration=None)
         path = dataclasses.replace(loops(), scene=scene).to_netcdf(tmp_path / "run.nc")
         table.unlink(missing_ok=True)
-        assert Result.from_netcdf(path).scene == scene
+        assert load_result(path).scene == scene
         assert str(tmp_path) not in opened(path).attrs["scene"]
     assert opened(path, "motion")["coefficients"].dims == ("piece", "channel", "power")
 

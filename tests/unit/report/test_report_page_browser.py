@@ -11,7 +11,7 @@ from support import preset_run
 from support.synthetic import opened
 
 from msfp_gen.report import write_report
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import load_result
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 DRIVER = shutil.which("chromedriver")
@@ -43,7 +43,7 @@ def saved(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def page(saved):
-    return write_report(Result.from_netcdf(saved), saved.with_suffix(".html"))
+    return write_report(load_result(saved), saved.with_suffix(".html"))
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +113,7 @@ def test_it_loads_offline_without_a_word_in_the_console(browser, page):
 def test_it_opens_at_the_peak_and_plays_from_the_start(start, page, saved):
     browser = start()
     browser.get(page.as_uri())
-    u = Result.from_netcdf(saved).history.displacement[:, :2]
+    u = load_result(saved).history.displacement[:, :2]
     shown = js(browser, "return [...at('displacement', current)].slice(0, 2)")
     assert np.hypot(*shown) == pytest.approx(np.hypot(*u.T).max(), rel=2e-3)
     assert js(browser, "return current") == js(browser, "return report.peak") > 0

@@ -10,8 +10,9 @@ import pytest
 from support import preset_run, scene_of
 from support.gradients import heated
 
-from msfp_gen import Motion, Result, simulate
+from msfp_gen import Motion, simulate
 from msfp_gen.results.history import Extremes
+from msfp_gen.results.result import load_result
 from msfp_gen.specification import contract
 
 PEAKS = ("peak_displacement", "peak_force", "peak_sliding", "minimum_gap", "minimum_normal_force")
@@ -45,7 +46,7 @@ def test_extremes_hold_for_the_rows_and_the_file(tmp_path: Path) -> None:
     assert extremes.displacement[3] >= np.hypot(*history.displacement[:, :2].T).max()
     assert (extremes.least_normal <= history.normal_force.min(axis=0)).all()
     assert extremes.top_force[3] > 1.02 * np.hypot(*history.top_force[:, :2].T).max()
-    again = Result.from_netcdf(result.to_netcdf(tmp_path / "run.nc"))
+    again = load_result(result.to_netcdf(tmp_path / "run.nc"))
     assert again.summary == result.summary
 
 

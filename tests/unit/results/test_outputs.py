@@ -17,7 +17,7 @@ from support.synthetic import loops
 from msfp_gen import InputError, load_scene
 from msfp_gen.cli import main
 from msfp_gen.results.files import WRITERS, table_of
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import load_result
 from msfp_gen.scene.file.loader import scene_from_table
 
 FLAT = (".csv", ".parquet")
@@ -108,7 +108,7 @@ def test_every_format_of_a_result_without_events(tmp_path, result):
     quiet = dataclasses.replace(result, events=())
     for suffix in WRITERS:
         assert quiet.save(tmp_path / f"run{suffix}").stat().st_size > 1000
-    assert Result.from_netcdf(tmp_path / "run.nc").events == ()
+    assert load_result(tmp_path / "run.nc").events == ()
     assert loadmat(tmp_path / "run.mat")["event_time"].size == 0
 
 
@@ -147,7 +147,7 @@ def test_run_writes_the_format_of_the_suffix(suffix, tmp_path, capsys):
     elif suffix == ".mat":
         assert loadmat(path)["time"][-1, 0] == 0.5
     else:
-        assert Result.from_netcdf(path).history.time[-1] == 0.5
+        assert load_result(path).history.time[-1] == 0.5
 
 
 @pytest.mark.parametrize("suffix", WRITERS)

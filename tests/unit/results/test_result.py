@@ -6,7 +6,6 @@ import dataclasses
 import json
 
 import h5netcdf
-import h5py
 import numpy as np
 import pytest
 from support import thinned
@@ -14,10 +13,9 @@ from support.buildings import pushed
 from support.synthetic import LOAD, history, loops, opened, ramp, scene
 
 from msfp_gen import Load, load_scene, simulate
-from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.history import ENERGY, Counters, quantities
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import Result, load_result
 from msfp_gen.results.summary import energy_balance
 from msfp_gen.scene.top import Top
 
@@ -86,7 +84,7 @@ def test_a_file_gives_back_what_was_written(run, tmp_path):
     assert (read.attrs["status"], read.attrs["title"]) == ("stopped", result.scene.name)
     for name in ("surface", "kind") if isinstance(result, Result) else ():
         assert read[f"event_{name}"].values.tolist() == [getattr(event, name) for event in result.events]
-    back = type(result).from_netcdf(path)
+    back = load_result(path)
     assert back.identity == result.identity and back.summary == result.summary
     assert (back.counters, back.provenance) == (result.counters, result.provenance)
     assert back.dataset.identical(result.dataset)
@@ -94,21 +92,13 @@ def test_a_file_gives_back_what_was_written(run, tmp_path):
 
 @pytest.mark.parametrize("run", thinned(RUNS.values(), lambda run: run is not still), ids=RUNS)
 def test_damaged_and_foreign_files_are_refused(run, tmp_path):
-    result, kind = run(), type(run())
-    path = result.to_netcdf(tmp_path / "run.nc")
+    path = run().to_netcdf(tmp_path / "run.nc")
     content = path.read_bytes()
     with pytest.raises(InputError, match="no such file"):
-        kind.from_netcdf(tmp_path / "none.nc")
-    with h5py.File(path, "r+") as file:
-        file["sliding"][0, ..., -1] += 1e-6
-    with pytest.raises(InputError, match="a value was changed after this file was written"):
-        kind.from_netcdf(path)
+        load_result(tmp_path / "none.nc")
     (tmp_path / "short.nc").write_bytes(content[: len(content) // 2])
     with pytest.raises(InputError, match="no netCDF-4 file that can be read"):
-        kind.from_netcdf(tmp_path / "short.nc")
-    other = Result if kind is BuildingResult else BuildingResult
-    with pytest.raises(InputError, match=rf"read it with {kind.__name__}\.from_netcdf"):
-        other.from_netcdf(result.to_netcdf(tmp_path / "again.nc"))
+        load_result(tmp_path / "short.nc")
 
 
 def test_a_file_of_something_else_is_no_result(tmp_path):
@@ -116,7 +106,7 @@ def test_a_file_of_something_else_is_no_result(tmp_path):
 
     xr.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
     with pytest.raises(InputError, match=r"a\.nc.*no result"):
-        Result.from_netcdf(tmp_path / "a.nc")
+        load_result(tmp_path / "a.nc")
 
 
 def test_failed_run_is_saved_with_its_status(tmp_path):
@@ -166,7 +156,7 @@ def test_rows_that_do_not_follow_each_other_are_refused(tmp_path):
     with h5netcdf.File(path, "a") as file:
         file["time"][...] = whole.time[::-1]
     with pytest.raises(InputError, match="rising"):
-        Result.from_netcdf(path)
+        load_result(path)
 
 
 def test_summary_knows_the_answers():

@@ -18,7 +18,7 @@ from support.damaged_results import forge, virtual
 
 from msfp_gen import InputError, Motion, simulate
 from msfp_gen.cli import main
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import load_result
 from msfp_gen.scene.scene_fields import Stop
 
 COUNTS = [150, pytest.param(5000, marks=pytest.mark.slow)]
@@ -45,7 +45,7 @@ def copy(saved: Path, tmp_path: Path) -> Path:
 
 def refusal(path: Path) -> str:
     with pytest.raises(InputError) as caught:
-        Result.from_netcdf(path)
+        load_result(path)
     text = str(caught.value)
     assert text.startswith(f"path = '{path}': ") and text.isprintable() and len(text) <= 500
     return text
@@ -59,7 +59,7 @@ def noise(content: bytes, dice: random.Random) -> bytes:
 
 @pytest.mark.parametrize("count", COUNTS)
 def test_damage_is_refused_or_does_not_matter(saved: Path, tmp_path: Path, count: int) -> None:
-    whole, expected, ends = saved.read_bytes(), Result.from_netcdf(saved), set()
+    whole, expected, ends = saved.read_bytes(), load_result(saved), set()
     path = tmp_path / "damaged.nc"
     for seed in range(count):
         dice, content = random.Random(seed), whole
@@ -67,7 +67,7 @@ def test_damage_is_refused_or_does_not_matter(saved: Path, tmp_path: Path, count
             content = dice.choice([flip, flip, cut, remove, noise, noise])(content, dice) if content else content
         path.write_bytes(content)
         try:
-            found = Result.from_netcdf(path)
+            found = load_result(path)
         except InputError:
             ends.add("refused")
         else:
@@ -84,7 +84,7 @@ def test_forged_content_is_refused_or_is_a_result(copy: Path, saved: Path, tmp_p
         shutil.copy(saved, copy)
         done = forge(copy, random.Random(seed))
         try:
-            found = Result.from_netcdf(copy)
+            found = load_result(copy)
         except InputError:
             ends.add("refused")
             continue
@@ -93,7 +93,7 @@ def test_forged_content_is_refused_or_is_a_result(copy: Path, saved: Path, tmp_p
         if seed % 5:
             continue
         found.to_netcdf(tmp_path / "again.nc")
-        assert Result.from_netcdf(tmp_path / "again.nc").dataset.identical(found.dataset), (seed, done)
+        assert load_result(tmp_path / "again.nc").dataset.identical(found.dataset), (seed, done)
     assert ends == {"refused", "read"}
 
 
@@ -187,7 +187,7 @@ def test_a_file_of_another_version_that_cannot_be_read_says_so(copy: Path) -> No
     """A file that can be read is read; one that lacks a variable is not called damaged."""
     with h5py.File(copy, "r+") as file:
         file.attrs["edition"] = "0" * 12
-    assert Result.from_netcdf(copy).status == "ok"
+    assert load_result(copy).status == "ok"
     with h5py.File(copy, "r+") as file:
         del file["gap"]
     assert "another version of msfp-gen wrote this result" in refusal(copy)
@@ -200,13 +200,13 @@ def test_what_others_add_does_not_matter(copy: Path, saved: Path) -> None:
     with h5py.File(copy, "r+") as file:
         file.attrs["history"] = "made larger"
         file["mine"] = np.zeros((3, 3))
-    assert Result.from_netcdf(copy).dataset.identical(Result.from_netcdf(saved).dataset)
+    assert load_result(copy).dataset.identical(load_result(saved).dataset)
 
 
 def test_the_event_of_a_stop_is_of_no_surface(tmp_path: Path) -> None:
     stopped = simulate(scene_of("fenz-test2", duration=10.0, stop=Stop(displacement=0.005)))
     assert stopped.status == "stopped" and [(event.kind, event.surface) for event in stopped.events] == [("stop", 0)]
-    (event,) = Result.from_netcdf(stopped.to_netcdf(tmp_path / "stopped.nc")).events
+    (event,) = load_result(stopped.to_netcdf(tmp_path / "stopped.nc")).events
     assert (event.kind, event.surface, event.time) == ("stop", 0, stopped.events[0].time)
 
 
@@ -228,4 +228,4 @@ def test_each_field_of_a_note_is_checked(copy: Path, field: str) -> None:
         with h5py.File(copy, "r+") as file:
             file.attrs["notes"] = text
         with pytest.raises(InputError, match="damaged") if not valid else nullcontext():
-            assert Result.from_netcdf(copy)
+            assert load_result(copy)

@@ -35,6 +35,7 @@ from msfp_gen.common.identity import fingerprint
 from msfp_gen.report.page import outcome
 from msfp_gen.results.history import Event
 from msfp_gen.results.note import Note
+from msfp_gen.results.result import load_result
 from msfp_gen.results.sliding import intervals, merged, openings
 from msfp_gen.results.verdict import LIMITS, RIM_SHARE, Reading, Value
 from msfp_gen.scene.effect_selection import scene_doubts
@@ -454,9 +455,9 @@ LIMITED = Limits(rim_force=12e3, uplift_height=1e-3, temperature=180.0, displace
 def test_limits_are_kept_in_files(kind: str, tmp_path: Path) -> None:
     whole: Any = preset_run("fenz-test5") if kind == "bearing" else at_the_rims()
     result = replace(whole, scene=replace(whole.scene, limits=LIMITED))
-    read = type(result).from_netcdf(result.to_netcdf(tmp_path / "run.nc"))
+    read = load_result(result.to_netcdf(tmp_path / "run.nc"))
     assert read.scene.limits == LIMITED and read.verdict.as_dict == result.verdict.as_dict
-    assert type(whole).from_netcdf(whole.to_netcdf(tmp_path / "other.nc")).scene.limits is None
+    assert load_result(whole.to_netcdf(tmp_path / "other.nc")).scene.limits is None
 
 
 def test_limits_are_no_part_of_the_identity(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from msfp_gen import Auto, InitialState, InputError, Limits, Motion, changed_scene, load_scene, simulate
+from msfp_gen.results.result import load_result
 from msfp_gen.scene.fidelity import (
     LOOSE,
     Backbone,
@@ -82,7 +83,7 @@ def test_each_level_runs_alone_and_says_what_it_cannot_see(word):
 def test_a_reduced_scene_is_written_and_read_as_it_is(tmp_path):
     run = simulate(changed_scene("fenz-test2", {"fidelity": "equivalent", "effects.dimension": "planar"}))
     path = run.to_netcdf(tmp_path / "run.nc")
-    again = type(run).from_netcdf(path)
+    again = load_result(path)
     assert again.scene.bearing == run.scene.bearing and again.notes == run.notes
 
 
@@ -220,7 +221,7 @@ def test_surfaces_of_one_pendulum_are_none_of_the_device(tmp_path):
     limits = {"limits.displacement": limit, "limits.rim_force": 1.0}
     found = simulate(changed_scene("ridgecrest-ccc", {**changes, **limits}))
     assert [one.limit.key for one in found.verdict.exceeded] == ["displacement"] and found.verdict.word == "exceeded"
-    read = type(run).from_netcdf(run.to_netcdf(tmp_path / "run.nc"))
+    read = load_result(run.to_netcdf(tmp_path / "run.nc"))
     assert read.verdict.word == "not judged" and read.summary.keys() == run.summary.keys()
     table = {"scene": "fenz-test2", "keep": ["peak_displacement", "peak_sliding", "capacity_used", "verdict"]}
     study = load_study({**table, "axes": {"level": {"sets": "fidelity", "values": ["equivalent"]}}})

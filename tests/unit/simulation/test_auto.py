@@ -25,7 +25,7 @@ from msfp_gen import (
 )
 from msfp_gen.model.model import build_model
 from msfp_gen.motions.piecewise import ORDER
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import Result, load_result
 from msfp_gen.scene import effect_switching
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import Ending, all_effects, next_effects, stopping_monitors
@@ -431,7 +431,7 @@ def test_energies_go_on_over_a_change_of_models() -> None:
 
 def test_notes_are_kept_in_the_file(tmp_path: Any) -> None:
     result = simulate(kumar())
-    again = Result.from_netcdf(result.to_netcdf(tmp_path / "out.nc"))
+    again = load_result(result.to_netcdf(tmp_path / "out.nc"))
     assert again.notes == result.notes and again.scene == result.scene
 
 

@@ -30,7 +30,7 @@ from msfp_gen import InputError, Motion, RunError, Scene, build_model, simulate
 from msfp_gen.cli import main
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import replacing
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import Result, load_result
 from msfp_gen.scene.scene_fields import Stop
 from msfp_gen.simulation import bearing_run as simulation
 from msfp_gen.simulation import checkpoint
@@ -101,7 +101,7 @@ def test_what_an_interrupted_run_had_is_a_beginning_of_the_whole(tmp_path: Path)
     whole, part = preset_run("fenz-test2"), interrupted(scene_of("fenz-test2"), tmp_path / "run.ck", 20.0)
     count = len(part.history.time)
     assert np.array_equal(part.history.tilt_angles, whole.history.tilt_angles[:count])
-    saved = Result.from_netcdf(part.to_netcdf(tmp_path / "part.nc"))
+    saved = load_result(part.to_netcdf(tmp_path / "part.nc"))
     assert saved.status == "interrupted" and re.search(r"at t = .* s of 56\.25 s: interrupted", saved.message)
 
 
@@ -415,7 +415,7 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> Result:
     process = started(folder, "--checkpoint", "run.ck", chunk=4000)
     assert process.communicate()[1].splitlines()[-1] == "wrote run.nc" and process.returncode == 0
     assert [path.name for path in folder.iterdir()] == ["run.nc"], "a checkpoint that has served is gone"
-    return Result.from_netcdf(folder / "run.nc")
+    return load_result(folder / "run.nc")
 
 
 @pytest.mark.parametrize("name", thinned(["SIGINT", "SIGTERM", "SIGHUP"], lambda name: name == "SIGTERM"))
@@ -427,11 +427,11 @@ def test_a_signal_leaves_a_valid_part_that_says_so(name: str, tmp_path: Path, re
     assert process.returncode == 128 + getattr(signal, name)
     assert errors[-1].endswith("; what was computed until then is in run.nc; continue with --resume run.ck")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.ck", "run.nc"]
-    part = Result.from_netcdf(tmp_path / "run.nc")
+    part = load_result(tmp_path / "run.nc")
     assert part.status == "interrupted" and len(part.history.time) > 1 and part.history.time[-1] < 0.5
     if name == "SIGINT":
         assert finished(tmp_path) == 0
-        assert_same(request.getfixturevalue("uninterrupted"), Result.from_netcdf(tmp_path / "run.nc"))
+        assert_same(request.getfixturevalue("uninterrupted"), load_result(tmp_path / "run.nc"))
         assert [path.name for path in tmp_path.iterdir()] == ["run.nc"]
 
 
@@ -454,7 +454,7 @@ def test_kill_at_any_moment_loses_no_checkpoint(tmp_path: Path, uninterrupted: R
         reached.append(checkpoint.read(path)[1][0].time)
     assert reached == sorted(set(reached)) and reached[-1] < 0.5
     assert finished(tmp_path) == 0
-    assert_same(uninterrupted, Result.from_netcdf(tmp_path / "run.nc"))
+    assert_same(uninterrupted, load_result(tmp_path / "run.nc"))
     assert [each.name for each in tmp_path.iterdir()] == ["run.nc"], "what killed processes left is gone too"
 
 
@@ -489,7 +489,7 @@ def test_a_full_disk_for_results_does_not_lose_a_kept_run(
     assert f"the run is not lost: make room and give --resume {path}" in capsys.readouterr().err
     assert not list(small_disk.iterdir())
     assert main(["run", "fenz-test2", "-o", str(tmp_path / "run.nc"), "--resume", str(path)]) == 0
-    assert_same(preset_run("fenz-test2"), Result.from_netcdf(tmp_path / "run.nc"))
+    assert_same(preset_run("fenz-test2"), load_result(tmp_path / "run.nc"))
 
 
 def test_a_full_disk_for_checkpoints_stops_no_run(small_disk: Path) -> None:

@@ -15,7 +15,7 @@ import pytest
 from support import failure_of, hearing, scene_of
 
 from msfp_gen import Effects, Motion, RunError, Scene, Solver, Top, build_model, presets, simulate
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import Result, load_result
 from msfp_gen.scene.scene_fields import InitialState
 
 LOAD = 112e3
@@ -110,7 +110,7 @@ def test_steps_used_up(method: str) -> None:
 
 def test_partial_result_is_written_and_read(tmp_path) -> None:  # type: ignore[no-untyped-def]
     result = partial(failure_of(scene_of("fenz-test2", solver={"max_steps": 20})), "steps")
-    again = Result.from_netcdf(result.to_netcdf(tmp_path / "partial.nc"))
+    again = load_result(result.to_netcdf(tmp_path / "partial.nc"))
     assert (again.status, again.message) == (result.status, result.message)
     assert np.array_equal(again.history.top_force, result.history.top_force)
 

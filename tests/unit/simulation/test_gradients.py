@@ -32,6 +32,7 @@ from msfp_gen import (
 from msfp_gen.model.compiled import bodies_and_surfaces, separations_at_rest, top_values
 from msfp_gen.model.model import build_model
 from msfp_gen.results.history import Extremes
+from msfp_gen.results.result import load_result
 from msfp_gen.scene.effect_selection import slider_period
 from msfp_gen.scene.parameters import changed_parameters, parameters_of
 from msfp_gen.simulation.bearing_run import BearingRun
@@ -142,7 +143,7 @@ def test_the_summary_has_derivatives_by_parameter() -> None:
 def test_a_file_holds_the_gradients(energies: bool, tmp_path: Path) -> None:
     given = with_energies() if energies else result()
     path = given.to_netcdf(tmp_path / "run.nc")
-    read = Result.from_netcdf(path)
+    read = load_result(path)
     assert read.gradient.identical(given.gradient)
     for parameter, expected in given.gradient_summary.items():
         found = read.gradient_summary[parameter]
@@ -158,7 +159,7 @@ def test_a_file_with_damaged_parameters_is_refused(parameters: str, tmp_path: Pa
     with h5py.File(path, "a") as file:
         file["gradient"].attrs["parameters"] = parameters
     with pytest.raises(InputError, match="give a file that `run -o` wrote"):
-        Result.from_netcdf(path)
+        load_result(path)
 
 
 @pytest.mark.parametrize("name", ["gap", "slip_velocity"])
@@ -167,7 +168,7 @@ def test_a_file_that_lacks_a_derivative_of_the_summary_is_refused(name: str, tmp
     with h5py.File(path, "a") as file:
         del file["gradient"][name]
     with pytest.raises(InputError, match=f"the gradient has no {name}"):
-        Result.from_netcdf(path)
+        load_result(path)
 
 
 def test_a_file_that_lacks_one_of_the_energies_is_refused(tmp_path: Path) -> None:
@@ -175,7 +176,7 @@ def test_a_file_that_lacks_one_of_the_energies_is_refused(tmp_path: Path) -> Non
     with h5py.File(path, "a") as file:
         del file["gradient"]["energy_numerical"]
     with pytest.raises(InputError, match="energy_numerical is missing"):
-        Result.from_netcdf(path)
+        load_result(path)
 
 
 class Seeds:
@@ -365,7 +366,7 @@ def test_each_derivative_has_its_error_where_a_rim_is_met(tmp_path: Path) -> Non
         }
         assert np.all(error >= 0)
     assert 0 < gradient.sliding_error.max() < 0.1 * np.abs(gradient.sliding).max()
-    read = Result.from_netcdf(after_contact().to_netcdf(tmp_path / "run.nc"))
+    read = load_result(after_contact().to_netcdf(tmp_path / "run.nc"))
     assert read.gradient.identical(gradient)
     for parameter, summary in after_contact().gradient_summary.items():
         assert set(summary["error"]) == set(summary) - {"error"}

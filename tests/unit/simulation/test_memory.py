@@ -14,7 +14,7 @@ from support.resuming import assert_same
 
 from msfp_gen import Auto, InputError, Motion, RunError, simulate, simulate_batch
 from msfp_gen.cli import main
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import Result, load_result
 from msfp_gen.simulation import bearing_run as simulation
 from msfp_gen.simulation import memory
 
@@ -71,7 +71,7 @@ def test_a_run_that_outgrows_the_memory_keeps_its_rows(monkeypatch: pytest.Monke
     count = len(part.history.time)
     assert 100 < count <= 121
     np.testing.assert_array_equal(part.history.top_force, whole.history.top_force[:count])
-    assert Result.from_netcdf(part.to_netcdf(tmp_path / "part.nc")).status == "memory"
+    assert load_result(part.to_netcdf(tmp_path / "part.nc")).status == "memory"
     assert_same(whole, simulate(scene_of("fenz-test2"), checkpoint=path, resume=True))  # with more memory
 
 

@@ -17,7 +17,7 @@ from support.study_tables import rows_of, write_record
 import msfp_gen
 from msfp_gen import BaseSlab, Building, InputError, RunError, Storey, changed_scene, load_scene, simulate
 from msfp_gen.common.identity import fingerprint
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import load_result
 from msfp_gen.scene.file import motion_tables
 from msfp_gen.scene.file.catalogue import scene_table
 from msfp_gen.scene.file.loader import dumps
@@ -256,5 +256,5 @@ def test_the_identity_of_a_scene_is_that_of_all_its_values(tmp_path: Path) -> No
 def test_a_result_knows_the_scene_of_its_run(tmp_path: Path) -> None:
     result = simulate(changed_scene("fenz-test1", {"solver.rtol": 1e-2}))
     assert result.identity == fingerprint(result.scene)
-    assert Result.from_netcdf(result.to_netcdf(tmp_path / "run.nc")).identity == result.identity
+    assert load_result(result.to_netcdf(tmp_path / "run.nc")).identity == result.identity
     assert simulate(changed_scene("fenz-test1", {"solver.rtol": 2e-2})).identity != result.identity

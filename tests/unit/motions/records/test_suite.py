@@ -11,7 +11,7 @@ from msfp_gen import InputError, Motion, load_scene
 from msfp_gen.cli import main
 from msfp_gen.motions.records import Record, ScaleTo, response_spectrum, scaled_suite, write_csv
 from msfp_gen.motions.records.record import G
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import load_result
 from msfp_gen.scene.file.loader import load_suite
 from msfp_gen.studies.sweep import variations, varied_field
 
@@ -114,7 +114,7 @@ def test_a_suite_scales_its_records_and_its_motions_run(folder: Path, capsys: py
     assert "its least share of the target is 1.000" in out and (folder / "s.png").stat().st_size > 10_000
     words = ["--suite", str(path), "--vary", "duration=0.5", "-o", str(folder / "runs")]
     assert main(["batch", str(folder / "scene.toml"), *words]) == 0
-    kept = Result.from_netcdf(folder / "runs" / "2-scene-record-b-duration-0.5.nc")
+    kept = load_result(folder / "runs" / "2-scene-record-b-duration-0.5.nc")
     assert kept.scene.motion == suite.records[1].motion
     peak = np.abs(suite.records[0].motion.acceleration(suite.records[0].motion.knots)).max(axis=0)[0] / G
     assert f"{peak:.4f}" in out

@@ -142,7 +142,7 @@ def test_ringing_that_nothing_damps_is_stated_with_what_it_changes_here():
     found = simulate_within(scene, 0.005)
     resolved = run_native("esdirk4", with_all_effects(scene), 1e-7, 60.0, repeats=0)
     true = errors(run_native("implicit", scene, found.chosen.rtol, 60.0, repeats=0), resolved)
-    assert largest_error(true) > 0.01 and found.estimate is None
+    assert largest_error(true) > 0.005 and found.estimate is None
     assert f"{100 * true.force_rms:.2g} % RMS in force, {100 * true.sliding_rms:.2g} % in sliding" in found.left_out
     assert "519 Hz" in found.left_out and "give contact_damping" in found.left_out
     assert any("not known" in row[1] for row in found.tables[0].rows)
@@ -182,7 +182,7 @@ def test_models_are_not_built_within_the_budget(monkeypatch):
 @pytest.mark.parametrize(("mass", "amplitude", "frequency"), [(200.0, 1e-3, 18.0), (20.0, 1e-3, 40.0)])
 def test_slow_ringing_of_stuck_sliders_is_in_the_estimate(mass, amplitude, frequency):
     """The L-stable default filters it: a run at 1e-3 is off by 8 to 10 % RMS, though 1e-4 agrees with it better."""
-    bearing = presets.bearing("fenz-tfp").replace(mass=[mass, mass, mass, 8.0])
+    bearing = presets.bearing("fenz-tfp").replace(mass=[mass, mass, mass, 8.0], contact_damping=0.0)
     motion, top = Motion.harmonic(amplitude, frequency, cycles=6), Top.rig(112e3, 1e8, 5.0, rotational_stiffness=1e6)
     scene = Scene(bearing, motion, top, effects=Effects(dimension="planar", rims=False))
     found = simulate_within(scene, 0.02)

@@ -1,0 +1,123 @@
+"""A system of a kind that the package does not know runs like any other, from a file too, by an entry point."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from msfp_gen import InputError, Motion, Scene, load_scene, simulate, simulate_batch, study
+from msfp_gen.report import write_report
+from msfp_gen.results.quantities import quantities
+from msfp_gen.scene.explain import explain
+from msfp_gen.scene.file import catalogue
+from msfp_gen.scene.file.loader import scene_from_table, scene_text
+from msfp_gen.scene.system import GROUP, Kind, OtherSystem, kinds
+from msfp_gen.simulation.bearing_run import start_bearing
+from msfp_gen.studies import read_study
+
+
+@dataclass(frozen=True)
+class Pair(OtherSystem):
+    """Two equal bearings that share a load: the scene of one of them under half of it."""
+
+    whole: Scene
+    motion: Motion
+    name: str = "pair"
+    fidelity: str = "exact"
+    run_options = frozenset({"strict"})
+
+    @property
+    def half(self) -> Scene:
+        top = replace(self.whole.top, axial_load=self.whole.top.axial_load / 2)
+        return replace(self.whole, top=top, motion=self.motion, name=self.name)
+
+    end = property(lambda self: self.half.end)
+    solver = property(lambda self: self.half.solver)
+    limits = property(lambda self: self.half.limits)
+    specs = property(lambda self: self.half.specs)
+    every_bearing = property(lambda self: (self.whole.bearing,) * 2)
+
+    def start(self, **options: Any) -> Any:
+        return start_bearing(self.half, **options)
+
+    def explain(self) -> list[Any]:
+        return explain(self.half)
+
+    def text(self) -> str:
+        return scene_text(self.half)
+
+    def quantities(self) -> dict[str, Any]:
+        return quantities(self.half)
+
+
+def pair_from_table(table: Mapping[str, Any], folder: Path | None = None, motion: Motion | None = None) -> Pair:
+    inner = {key: value for key, value in table.items() if key != "pair"} | dict(table["pair"])
+    scene = scene_from_table(inner, folder, motion)
+    return Pair(scene, scene.motion, scene.name)
+
+
+PAIR = Kind("pair", pair_from_table, lambda _: iter(()))
+TABLE = """
+name = "two"
+[pair]
+bearing = "fenz-tfp"
+top = { kind = "rig", axial_load = 224e3, stiffness = 1e8, damping = 5.0, rotational_stiffness = 1e6 }
+[motion]
+kind = "harmonic"
+amplitude = 0.02
+frequency = 0.5
+cycles = 1
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A scene file of a pair, whose kind an installed package offers."""
+    about = tmp_path / "pairs-1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: pairs\nVersion: 1\n")
+    (about / "entry_points.txt").write_text(f"[{GROUP}]\npair = pairs:PAIR\n")
+    monkeypatch.setitem(sys.modules, "pairs", sys.modules[__name__])
+    monkeypatch.syspath_prepend(str(tmp_path))
+    kinds.cache_clear()
+    path = tmp_path / "pair.toml"
+    path.write_text(TABLE)
+    yield path
+    kinds.cache_clear()
+
+
+def test_a_third_kind_runs_through_everything(file: Path, tmp_path: Path) -> None:
+    pair = load_scene(file)
+    assert isinstance(pair, Pair) and "pair" in catalogue.words()
+    result = simulate(pair, strict=True)
+    alone = simulate(pair.half)
+    assert np.array_equal(result.history.top_force, alone.history.top_force)
+    (again,) = simulate_batch([pair])
+    assert again.summary["peak_force"] == result.summary["peak_force"]
+    checkpoint = tmp_path / "pair.ck"
+    simulate(pair, checkpoint=checkpoint)
+    resumed = simulate(pair, checkpoint=checkpoint, resume=True)
+    assert np.array_equal(resumed.history.top_force, result.history.top_force)
+    page = write_report(result, tmp_path / "pair.html").read_text(encoding="utf-8")
+    assert "triple friction pendulum" in page
+    axes = {"load": {"sets": "pair.top.axial_load", "values": [224e3, 112e3]}}
+    study({"scene": str(file), "axes": axes, "keep": ["peak_force"]}, tmp_path / "out", threads=True)
+    table = read_study(tmp_path / "out")
+    assert table["peak_force"][0] == pytest.approx(result.summary["peak_force"]["radial"], rel=1e-12)
+    assert table["peak_force"][1] < 0.6 * table["peak_force"][0]
+
+
+def test_what_it_has_not_is_one_line(file: Path) -> None:
+    pair = load_scene(file)
+    with pytest.raises(InputError, match="threads: the run of this scene has no such option"):
+        simulate(pair, threads=2)
+    with pytest.raises(InputError, match="pair: unknown key"):
+        kinds.cache_clear()
+        sys.path.remove(str(file.parent))
+        load_scene(file)
