@@ -62,6 +62,10 @@ PULLED = (
     "; the springs of the rig are anchored above the base and pull the displaced top at once: lower top.stiffness, or "
     "leave out initial_state"
 )
+FLIPPED = (
+    "; nothing holds the top plate level while it flies: give the top a rotational_stiffness [N m/rad], or take a layout "
+    "with an articulated slider, such as (3, 1, 1)"
+)
 AT_ONCE = 1e-3  # [s]; a failure before is one of the initial state
 OVERTURNED = 0.1  # tilt of the top plate above which the stack is considered to overturn [rad]
 
@@ -77,6 +81,7 @@ def message_of(scene: Scene, segment: Segment) -> str:
     text = stopped(run.time, scene.end, status, *run.status[1:], cause)
     text += _state(scene, model, run) if _STATUSES[status].motion and run.row_count else ""
     text += PULLED if _pulled(scene, run) else ""
+    text += FLIPPED if _flipped(scene, status) else ""
     return text + (MASSLESS if _inertia_missing(scene, model, status) else "")
 
 
@@ -93,6 +98,11 @@ def _pulled(scene: Scene, run: Run) -> bool:
     state, top = scene.initial_state, scene.top
     anchored = isinstance(top, RigTop) and top.stiffness > 0
     return anchored and run.time < AT_ONCE and state is not None and bool(np.any(state.q))
+
+
+def _flipped(scene: Scene, status: str) -> bool:
+    """Whether the stack came apart below a plate that may turn freely once no surface carries."""
+    return status == "separated" and not getattr(scene.top, "rotational_stiffness", 0.0)
 
 
 def _inertia_missing(scene: Scene, model: Model, status: str) -> bool:

@@ -169,3 +169,23 @@ def test_no_row_between_steps_shows_a_surface_that_pulls(method):
     assert history.lift.max() > 0 and history.normal_force.min() >= 0
     assert not history.interface_force[history.normal_force == 0].any()
     assert min(history.energy[name].min() for name in ("rim_stored", "seat_dissipated", "friction_dissipated")) > -1e-3
+
+
+def test_a_plate_that_flips_in_flight_has_its_remedy() -> None:
+    """A single pendulum is lifted and turned at once; the spring that the message names holds its plate level."""
+    weight, thrown = 2e6, np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+    times = [0.0, 0.5, 0.5, 0.7, 0.7, 1.5]
+    load = Load.from_arrays(times, np.outer(thrown, [0, 0, 1.3 * weight]), np.outer(thrown, [0, 3e5, 0]))
+    motion = Motion.harmonic(0.01, 1.0, cycles=1.0)
+
+    def scene(stiffness: float) -> Scene:
+        spring = {"rotational_stiffness": stiffness, "rotational_damping": stiffness / 100}
+        top = Top.mass(weight / 9.81, 1e5, 0.5, vertical_stiffness=1e9, vertical_damping=3e6, **spring)
+        effects = Effects(uplift=True, dimension="planar")
+        return Scene(presets.bearing("single-fp"), motion, top, effects, load=load)
+
+    with pytest.raises(RunError, match=r"give the top a rotational_stiffness .* such as \(3, 1, 1\)") as caught:
+        simulate(scene(0.0))
+    assert caught.value.status == "separated"
+    level = simulate(scene(1e9))
+    assert level.summary["uplift"]["height"] > 0.05 and np.abs(level.history.tilt_angles).max() < 0.01
