@@ -116,6 +116,35 @@ def compare(scene: Scene) -> Comparison:
     return Comparison(scene.name, models, difference(fewer, all_effects), floor)
 
 
+def edges(count: int) -> Iterator[tuple[str, str, str]]:
+    """Name, models and agreement of tests whose sliders stand on their edges; where both runs end early, when."""
+    for number in range(count):
+        scene = auto_scenes.on_edge(SEED, number)
+        try:
+            found = compare(scene)
+        except RunError as error:
+            when, end = parted(scene)
+            assert error.result is not None
+            models = error.result.provenance["model"]
+            yield scene.name, words(models.split(", then ")), f"come apart at {when:.4f} s, {end:.4f} s"
+            continue
+        worst = max(astuple(found.difference))
+        yield scene.name, words(found.models), f"{100 * worst:.2f} %{'' if found.kept else ' **missed**'}"
+
+
+def parted(scene: Scene) -> tuple[float, float]:
+    """Times at which a scene comes apart with the effects of Auto, and with all [s]; inf: it does not."""
+    times = []
+    for tried in (scene, replace(scene, effects=replace(all_effects(scene), uplift=True))):
+        try:
+            run(tried)
+            times.append(float("inf"))
+        except RunError as error:
+            assert error.result is not None
+            times.append(float(error.result.history.time[-1]))
+    return times[0], times[1]
+
+
 def named() -> Iterator[Scene]:
     """The scenes of `promises.py` with the default contact damping, and two more; effects are left to Auto."""
     for name, scene in promises.scenes():
@@ -207,6 +236,9 @@ def main() -> None:
     parts += [(table, drawn(kind, given.seed, given.count)) for kind in auto_scenes.KINDS]
     for make, scenes in parts:
         print("\n".join(make(compared(scenes))), end="\n\n", flush=True)
+    print("| scene | modelled | largest difference |\n|---|---|---|")
+    for row in edges(pick(16, 2)):
+        print(f"| {' | '.join(row)} |", flush=True)
 
 
 if __name__ == "__main__":

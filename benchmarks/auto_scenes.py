@@ -215,6 +215,25 @@ def a_jolt(draw: Draw, duration: float, rate: float) -> Motion:
     return Motion.from_arrays(time, np.outer(acceleration / rate**2 * burst, [0.0, 0.0, 1.0]))
 
 
+def on_edge(seed: int, number: int) -> Scene:
+    """Test `number` of a seed whose sliders have narrow faces, a hundredth to a quarter as wide, so that most of them
+    stand on their edges. A rig holds the plate level, also that of a single pendulum, which has its whole face.
+    """
+    draw = Draw(seed, number)
+    what = Chosen(ORDER[number % len(ORDER)], "constant", ("report", "plastic")[number % 2])
+    bearing, share = a_bearing(draw, what), draw.decades((0.01, 0.25))
+    share = 1.0 if what.bearing == "single-fp" else share
+    bearing = bearing.replace(bodies=[replace(body, rim_radius=share * body.rim_radius) for body in bearing.bodies])
+    load = draw.decades((200.0, 3000.0)) * GRAVITY * sum(body.mass for body in bearing.bodies)
+    size = (0.04 if what.bearing == "single-fp" else reach(bearing)) * draw.flat(0.3, 0.7)
+    frequency = min(draw.decades((0.02, 0.3)), FASTEST / (2 * pi * size), float(np.sqrt(STRONGEST / size)) / (2 * pi))
+    top = Top.rig(load, 1e3 * load, 0.05 * load, 100.0 * load, 0.5 * load)
+    motion = Motion.harmonic(size, frequency, cycles=1.25)
+    return Scene(
+        bearing, motion, top, Auto(bouc_wen=what.hysteresis, rims=True), name=f"{what.bearing}, on edge {number}"
+    )
+
+
 ORDER = tuple(dict.fromkeys(BEARINGS))  # eight kinds of bearing
 DRIVES = ("mass, harmonic", "mass, noise", "mass, eight", "rig, line", "rig, circle")
 

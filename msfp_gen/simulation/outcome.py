@@ -63,8 +63,8 @@ PULLED = (
     "leave out initial_state"
 )
 FLIPPED = (
-    "; nothing holds the top plate level while it flies: give the top a rotational_stiffness [N m/rad], or take a layout "
-    "with an articulated slider, such as (3, 1, 1)"
+    "; nothing holds the top plate level while it flies: give the top a rotational_stiffness [N m/rad], or take a "
+    "layout with an articulated slider, such as (3, 1, 1)"
 )
 AT_ONCE = 1e-3  # [s]; a failure before is one of the initial state
 OVERTURNED = 0.1  # tilt of the top plate above which the stack is considered to overturn [rad]

@@ -9,7 +9,7 @@ import auto_scenes
 import pytest
 from support import thinned
 
-from msfp_gen import Scene
+from msfp_gen import RunError, Scene
 
 NAMED = 17  # number of named scenes
 TAKEN_LATE = {5}  # random scenes in which a jam brings uplift in, which the promise excludes
@@ -33,6 +33,21 @@ def test_auto_keeps_its_promise(kind: str, number: int) -> None:
         assert "uplift" in auto.left_out(found)
     else:
         assert found.kept, (found.difference, found.floor)
+
+
+@pytest.mark.parametrize("number", thinned(range(16), lambda number: number in (0, 3, 7, 10)))
+def test_auto_follows_sliders_on_their_edges(number: int) -> None:
+    """Within the promise; where the stack comes apart it does so at the same time."""
+    scene = auto_scenes.on_edge(auto.SEED, number)
+    try:
+        found = auto.compare(scene)
+    except RunError:
+        when, end = auto.parted(scene)
+        assert when == pytest.approx(end, rel=0.01)
+        return
+    assert found.kept, (found.difference, found.floor)
+    if number in (0, 7, 10):
+        assert "uplift" in auto.left_out(found)
 
 
 @pytest.mark.slow
