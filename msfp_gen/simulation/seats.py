@@ -75,7 +75,7 @@ def separations(model: Model, start: Start) -> Array:
 
 
 def slopes(model: Model, start: Start, direction: Start) -> Array:
-    """Derivative of `separations` by a parameter, ndarray, shape (n-1, 3) [m per its unit], by differences."""
+    """Derivative of `separations` by a parameter, ndarray, shape (n-1, 3), [m] per its unit, by differences."""
     step = start.step(direction)
 
     def difference(separations: Callable[[Start], Array | None]) -> Array | None:

@@ -298,12 +298,12 @@ def seats_at_start(scene: Scene, model: Model, frame: Frame, state: tuple[Array,
 
 
 def values_at_start(coefficients: Array) -> Array:
-    """Values and two derivatives at time zero of the first of some polynomials, shape (3, channels)."""
+    """Values and two derivatives at time zero of the first of some polynomials, shape (3, channels) [SI]."""
     return np.ascontiguousarray(derivatives(0.0) @ coefficients[0].T)
 
 
 def given_state(scene: Scene, model: Model, frame: Frame) -> tuple[Array, Array, Array]:
-    """The initial state of a scene in the frame of a model, without separations."""
+    """Angles, rates and friction state at the start, without separations, shape (n-1, k) each [rad], [rad/s], [-]."""
     count, state = scene.bearing.layout.surfaces, scene.initial_state
     q, v, f = (
         np.zeros((count, k)) if state is None else np.array(value, dtype=float)
