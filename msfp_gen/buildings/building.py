@@ -11,11 +11,12 @@ from functools import cached_property
 from io import BytesIO
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from msfp_gen.buildings.oscillators import FixedBase, Oscillators
 from msfp_gen.buildings.storey import FREEDOMS, MOTIONS, BaseSlab, Columns, Node, Storey, frame, rigid
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, MsfpError
@@ -176,7 +177,7 @@ class Building:
         held = np.asarray(self.boundary, dtype=int)
         inner = np.setdiff1d(np.arange(len(self.mass)), held)
         if not inner.size:
-            return FixedBase(held, inner, np.zeros((0, held.size)), np.zeros(0), np.zeros((0, 0)))
+            return FixedBase(held, inner, np.zeros((0, held.size)), np.zeros(0), *2 * (np.zeros((0, 0)),))
         k, m = self.stiffness[np.ix_(inner, inner)], self.mass[np.ix_(inner, inner)]
         lowest = float(np.linalg.eigvalsh(k)[0])
         if lowest <= 1e-14 * float(np.abs(k).max()):
@@ -190,7 +191,12 @@ class Building:
         order = np.flatnonzero(with_mass)[::-1]
         modes = vectors[:, order] / np.sqrt(squares[order])
         follow = -np.linalg.solve(k, self.stiffness[np.ix_(inner, held)])
-        return FixedBase(held, inner, follow, 1 / np.sqrt(squares[order]), modes)
+        return FixedBase(held, inner, follow, 1 / np.sqrt(squares[order]), modes, vectors[:, ~with_mass])
+
+    @cached_property
+    def oscillators(self) -> Oscillators:
+        """The same building as its attachments and an oscillator on them for each mode. Raises InputError, as `fixed`."""
+        return Oscillators.of(self.fixed, self.mass, self.damping, self.stiffness)
 
     @property
     def frequencies(self) -> Array:
@@ -320,29 +326,6 @@ def _node(name: str, indices: Sequence[int], position: ArrayLike, count: int) ->
     if place.shape != (3,) or not np.all(np.isfinite(place)):
         raise InputError(f"{path}: position = {position!r}; give three finite numbers [m]")
     return Node(name, place, np.eye(count)[own], carries=True)
-
-
-class FixedBase(NamedTuple):
-    """A structure with fixed boundary coordinates.
-
-    boundary, inner: indices of the boundary coordinates and of all others. follow: static response of the inner
-    coordinates to the boundary, shape (inner, boundary) [SI]. frequencies: circular, ascending, shape (modes,) [rad/s].
-    modes: of unit modal mass, shape (inner, modes) [SI].
-    """
-
-    boundary: Array
-    inner: Array
-    follow: Array
-    frequencies: Array
-    modes: Array
-
-    @property
-    def relative(self) -> Array:
-        """Motion of the inner coordinates relative to the static response: rows, shape (inner, n), [SI]."""
-        rows = np.zeros((len(self.inner), len(self.inner) + len(self.boundary)))
-        rows[:, self.inner] = np.eye(len(self.inner))
-        rows[:, self.boundary] = -self.follow
-        return rows
 
 
 MOST = 5000  # coordinates of a building, whose matrices are dense

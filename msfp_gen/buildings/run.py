@@ -315,20 +315,23 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
     grounds, ground_of = scene.grounds
     building, solver = scene.building, scene.solver
     grid = TimeGrid.of_histories(grounds, scene.end, (solver.max_step, *(ground.max_step for ground in grounds)))
-    attached = np.flatnonzero(np.any(scene.attachments, axis=(0, 1)))
+    same = building.oscillators
+    orders, watched, shares = vectors(scene)
     pieces = [snapped(ground.knots, ground.coefficients, grid.stops) for ground in grounds]
     module, key = load_driver("msfp_gen.buildings")
     run: CompiledRun = module.Run(
-        (building.mass, building.damping, building.stiffness),
-        attached,
+        (same.mass, same.damping, same.stiffness),
+        same.shares,
+        same.dampers,
+        same.springs,
         [member.port for member in members],
-        scene.attachments[:, :, attached],
+        (scene.attachments @ same.basis)[..., : len(same.mass)],
         pieces,
         ground_of,
         [member.entries for member in members],
         [member.faces for member in members],
-        vectors(scene),
-        np.stack([node.rows for node in building.nodes]),
+        (orders, watched @ same.basis, shares),
+        np.stack([node.rows @ same.basis for node in building.nodes]),
         scene.places - scene.mass_centre,
         weight=float(scene.axial_loads.sum()),
         stops=grid.stops,
@@ -350,12 +353,13 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
 
 def unpacked(run: BuildingRun) -> dict[str, Array]:
     """The rows until now by name, those of bearings with their index; each of shape (k, ...) [SI]."""
-    n = len(run.scene.building.mass)
-    shapes = [("time", ()), *((name, (n,)) for name in MOTIONS), ("ground", (len(run.grounds), 3, 3))]
+    basis = run.scene.building.oscillators.basis
+    shapes = [("time", ()), *((name, (len(basis.T),)) for name in MOTIONS), ("ground", (len(run.grounds), 3, 3))]
     shapes += [(name, ()) for name in ENERGIES]
     for index, member in enumerate(run.members):
         shapes += [(f"wrench {index}", (2, 6)), *((f"{name} {index}", shape) for name, shape in member.shapes)]
     rows: dict[str, Array] = parts(run.run.rows, shapes)
+    rows |= {name: rows[name] @ basis.T for name in MOTIONS}
     for index in {change.bearing for change in run.changes}:  # the integrals of their models begin anew
         work = rows[f"work {index}"]
         rows[f"work {index}"] = work + earlier_work(run.changes, index, work.shape)

@@ -9,17 +9,20 @@
 #include "msfp_math.h"
 #include "msfp_time.h"
 
-enum { FACTORS = 3 }; /* step sizes whose factors are kept */
+enum { LENGTHS = 64 }; /* most lengths of steps whose factors are kept */
 enum { ENDED = -1 };
 enum { ENERGIES = 3, DAMPED = 0, RECEIVED, GROUND }; /* integrals over the run */
 
-/* The linear equations at one step size: A = M/beta + C + beta K. */
+/* The linear equations at one length of step, with the oscillators eliminated: S x + forces = those without rates x. */
 typedef struct {
-    double beta;     /* [s]; 0: none */
-    long used;       /* when it was last used */
-    double *factors; /* [n][n] of A */
-    double *follow;  /* [attachments][n] A^-1 P, with P the columns of the attachments in the unit matrix */
-    double *mobility, *mobility_factors; /* [attachments]^2: P^T A^-1 P, by columns */
+    double length; /* [s]; 0: none */
+    double used;   /* when it was last used */
+    long tangent;  /* number of the tangent in `matrix`; 0: none */
+    int factored;
+    double *system, *factors;  /* [attachments][attachments] S, and its factors */
+    double *matrix;            /* factors of S + tangent */
+    int *pivots;
+    double *follow, *inverse;  /* [oscillators] (d + beta k)/D and 1/D, with D = 1/beta + d + beta k */
 } linear;
 
 /* The columns of each of several sets of rows in which any of its rows is not zero. */
@@ -68,7 +71,6 @@ struct msfp_building {
     /* State between two steps; pass_state (state.c) lists what a snapshot holds. */
     double t, h, previous_error, energy, energies[ENERGIES];
     double tangent_beta; /* of `tangent` [s]; 0: none */
-    double factored_beta; /* of `matrix` [s]; 0: none */
     int stop, jump, span, next_row;
     long counts[MSFP_BUILDING_COUNTS];
     double *u, *v, *a;  /* [n] */
@@ -80,18 +82,20 @@ struct msfp_building {
     pattern coupled; /* attachments that share a bearing with each attachment */
     pattern watched; /* coordinates that each vector of the scene depends on */
     pattern of_node; /* coordinates that each node depends on */
-    linear linear[FACTORS], *now;
-    long clock;
+    linear linear[LENGTHS], *now;
+    int lengths; /* that are kept */
+    double clock;
     int solving;   /* stage */
     double trying; /* length of the step [s] */
     double *stage_v, *stage_a;                       /* [stages][n] */
     double power[MSFP_STAGES][ENERGIES];
-    double *Q, *V, *free;        /* [n] of the stage: u = Q + beta v, v = V + beta a; rates without forces */
-    double *x, *residual;        /* [attachments] rates, and by how much they miss the solution */
-    double *change, *balance;    /* [attachments] of the rates; forces that are out of balance */
-    double *scale;               /* [attachments] of these [N], [N m] */
-    double *matrix;              /* [attachments]^2 */
-    int *pivots;
+    double *Q, *V;               /* [n] of the stage: u = Q + beta v, v = V + beta a */
+    double *driving;             /* [n] forces of these: on the attachments with those of the oscillators, on those */
+    double *x, *residual;        /* [attachments] rates; forces that are out of balance */
+    double *change;              /* [attachments] of the rates */
+    double *scale;               /* [attachments] of these forces [N], [N m] */
+    double *strain;              /* [oscillators], or its rate */
+    double *scaled;              /* [oscillators][attachments] shares */
     double *next_u, *product;    /* [n] */
     double next_energies[2];     /* kinetic and strain energy at the end of the step [J] */
     double *scratch;             /* [3][attachments] */
@@ -129,14 +133,19 @@ static inline const int *columns_of(const pattern *p, int set, int *count)
 double dot_at(int count, const int *columns, const double *row, const double *x);
 /* Patterns of the scene; MSFP_OK or MSFP_E_MEMORY. */
 int find_patterns(msfp_building *b);
-/* Factors at that beta [s], into b->now. */
-int factor_linear(msfp_building *b, double beta);
-/* x = A^-1 x [n]. */
-void solve_linear(msfp_building *b, double *x);
-/* Factors of I + mobility * tangent, into b->matrix, unless they are there. */
+/* The equations for steps of length h [s], into b->now, with the present tangent if there is one. Steps of one length
+ * differ by the rounding of times; the first one's length is that of the equations. */
+int factor_linear(msfp_building *b, double h);
+/* Factors of S + tangent, unless they are there. */
 int factor_tangent(msfp_building *b);
-/* x = (I + mobility * tangent)^-1 x [attachments]. */
+/* x = S^-1 x, (S + tangent)^-1 x [attachments]. */
+void solve_linear(msfp_building *b, double *x);
 void solve_tangent(msfp_building *b, double *x);
+/* What the tangent, which is kept as of `tangent_beta`, is multiplied by at the present length: stiffness prevails over
+ * damping. */
+double tangent_share(const msfp_building *b);
+/* s = y - P^T u [oscillators] of coordinates or rates [n]. */
+void strain_of(const msfp_building *b, const double *u, double *s);
 void linear_free(msfp_building *b);
 
 /* ---- stage.c ---- */

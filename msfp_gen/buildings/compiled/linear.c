@@ -1,11 +1,16 @@
-/* linear.c: the linear equations of a stage. With M a + C v + K u + P f = 0, u = Q + beta v and a = (v - V)/beta,
- * the rates v = A^-1 (M V/beta - K Q) - A^-1 P f follow from the forces f at the attachments. */
+/* linear.c: the linear equations of a stage. With u = Q + beta v and a = (v - V)/beta the oscillators have the rates
+ * (their driving force + e P^T v)/D, with e = d + beta k and D = 1/beta + e. For the rates v of the attachments
+ * S v + f = g remains, with the forces f of the bearings and S = M/beta + C + beta K + P e/(1 + beta e) P^T, a sum of
+ * matrices without negative eigenvalues. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("O3") /* vectorises products of matrices */
 #endif
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "building.h"
+
+static const double rounding = 1e-15; /* of times, relative above 1 s */
 
 /* Four columns at a time, so that a sum is loaded and stored once for four products. */
 void add_columns(int n, int columns, const double *restrict matrix, const double *restrict x, double *restrict y)
@@ -101,116 +106,145 @@ int find_patterns(msfp_building *b)
     return status;
 }
 
+void strain_of(const msfp_building *b, const double *u, double *s)
+{
+    const int r = b->scene.attachments, m = b->scene.n - r;
+    memset(s, 0, (size_t)m * sizeof *s);
+    add_columns(m, r, b->scene.shares, u, s);
+    for (int k = 0; k < m; ++k)
+        s[k] = u[r + k] - s[k];
+}
+
 /* ---- factors ---- */
 
 static void release(linear *l)
 {
+    free(l->system);
     free(l->factors);
+    free(l->matrix);
+    free(l->pivots);
     free(l->follow);
-    free(l->mobility);
-    free(l->mobility_factors);
-    *l = (linear){ 0 };
+    free(l->inverse);
+    l->system = l->factors = l->matrix = l->follow = l->inverse = NULL;
+    l->pivots = NULL;
 }
 
 /* All arrays or, where memory ends, none. */
-static int allocate(linear *l, size_t n, size_t r)
+static int allocate(linear *l, size_t r, size_t oscillators)
 {
-    if (l->factors)
+    if (l->system)
         return MSFP_OK;
-    linear arrays = {
-        .used = l->used,
-        .factors = malloc(n * n * sizeof(double)),
-        .follow = malloc(n * r * sizeof(double)),
-        .mobility = malloc(r * r * sizeof(double)),
-        .mobility_factors = malloc(r * r * sizeof(double)),
-    };
-    if (!arrays.factors || !arrays.follow || !arrays.mobility || !arrays.mobility_factors) {
-        release(&arrays);
-        return MSFP_E_MEMORY;
-    }
-    *l = arrays;
-    return MSFP_OK;
+    l->system = malloc(r * r * sizeof(double));
+    l->factors = malloc(r * r * sizeof(double));
+    l->matrix = malloc(r * r * sizeof(double));
+    l->pivots = malloc(r * sizeof(int));
+    l->follow = malloc((oscillators + 1) * sizeof(double));
+    l->inverse = malloc((oscillators + 1) * sizeof(double));
+    if (l->system && l->factors && l->matrix && l->pivots && l->follow && l->inverse)
+        return MSFP_OK;
+    release(l);
+    return MSFP_E_MEMORY;
 }
 
 void linear_free(msfp_building *b)
 {
-    for (int k = 0; k < FACTORS; ++k)
+    for (int k = 0; k < LENGTHS; ++k)
         release(&b->linear[k]);
 }
 
-/* The factors at that beta, or those that have not been used for longest. */
-static linear *place_for(msfp_building *b, double beta)
+/* The equations at that length, or those that have not been used for longest. */
+static linear *place_for(msfp_building *b, double h, int *known)
 {
     linear *oldest = &b->linear[0];
-    for (int k = 0; k < FACTORS; ++k) {
-        if (b->linear[k].beta == beta)
+    *known = 1;
+    for (int k = 0; k < b->lengths; ++k) {
+        if (fabs(b->linear[k].length - h) <= rounding * fmax(1.0, b->t))
             return &b->linear[k];
         if (b->linear[k].used < oldest->used)
             oldest = &b->linear[k];
     }
+    *known = 0;
     return oldest;
 }
 
-int factor_linear(msfp_building *b, double beta)
+/* S, and how the oscillators follow the attachments. */
+static void set_system(msfp_building *b, linear *l, double beta)
 {
     const msfp_building_scene *s = &b->scene;
-    int n = s->n, r = s->attachments, info = 0;
-    char lower[] = "L";
-    linear *l = b->now = place_for(b, beta);
-    l->used = ++b->clock;
-    if (l->beta == beta)
-        return MSFP_OK;
-    l->beta = 0.0;
-    if (allocate(l, n, r))
-        return MSFP_E_MEMORY;
-    for (size_t i = 0; i < (size_t)n * n; ++i)
-        l->factors[i] = s->mass[i] / beta + s->damping[i] + beta * s->stiffness[i];
-    s->lapack.potrf(lower, &n, l->factors, &n, &info);
-    if (info)
-        return MSFP_E_IRREGULAR;
-    memset(l->follow, 0, (size_t)n * r * sizeof(double));
-    for (int k = 0; k < r; ++k)
-        l->follow[(size_t)k * n + s->attached[k]] = 1.0;
-    s->lapack.potrs(lower, &n, &r, l->factors, &n, l->follow, &n, &info);
-    for (int k = 0; k < r; ++k)
+    int r = s->attachments, m = s->n - r;
+    char lower[] = "L", plain[] = "N";
+    double one = 1.0;
+    for (size_t i = 0; i < (size_t)r * r; ++i)
+        l->system[i] = s->mass[i] / beta + s->damping[i] + beta * s->stiffness[i];
+    for (int k = 0; k < m; ++k) {
+        const double e = s->dampers[k] + beta * s->springs[k], root = sqrt(e / (1.0 + beta * e));
+        l->inverse[k] = 1.0 / (1.0 / beta + e);
+        l->follow[k] = e * l->inverse[k];
         for (int i = 0; i < r; ++i)
-            l->mobility_factors[(size_t)k * r + i] = l->mobility[(size_t)i * r + k] =
-                l->follow[(size_t)k * n + s->attached[i]];
-    s->lapack.potrf(lower, &r, l->mobility_factors, &r, &info);
-    if (info)
-        return MSFP_E_IRREGULAR;
-    l->beta = beta;
-    return MSFP_OK;
+            b->scaled[(size_t)k * r + i] = root * s->shares_turned[(size_t)k * r + i];
+    }
+    if (m)
+        s->lapack.syrk(lower, plain, &r, &m, &one, b->scaled, &r, &one, l->system, &r);
+    for (int k = 0; k < r; ++k)
+        for (int i = k + 1; i < r; ++i)
+            l->system[(size_t)i * r + k] = l->system[(size_t)k * r + i];
 }
 
-void solve_linear(msfp_building *b, double *x)
+int factor_linear(msfp_building *b, double h)
 {
-    int n = b->scene.n, one = 1, info;
+    int r = b->scene.attachments, info = 0, known;
     char lower[] = "L";
-    b->scene.lapack.potrs(lower, &n, &one, b->now->factors, &n, x, &n, &info);
+    linear *l = b->now = place_for(b, h, &known);
+    l->used = ++b->clock;
+    if (!known) {
+        l->length = h;
+        l->factored = 0;
+        ++b->counts[MSFP_BUILDING_LENGTHS];
+    }
+    if (!l->factored) {
+        l->tangent = 0;
+        if (allocate(l, r, b->scene.n - r))
+            return MSFP_E_MEMORY;
+        set_system(b, l, b->method.diagonal * l->length);
+        memcpy(l->factors, l->system, (size_t)r * r * sizeof *l->factors);
+        b->scene.lapack.potrf(lower, &r, l->factors, &r, &info);
+        if (info)
+            return MSFP_E_IRREGULAR;
+        l->factored = 1;
+    }
+    return b->tangent_beta == 0.0 ? MSFP_OK : factor_tangent(b);
 }
+
+double tangent_share(const msfp_building *b) { return b->method.diagonal * b->now->length / b->tangent_beta; }
 
 int factor_tangent(msfp_building *b)
 {
     int r = b->scene.attachments, info, count;
-    if (b->factored_beta == b->now->beta)
+    linear *l = b->now;
+    const double share = tangent_share(b);
+    if (l->tangent == b->counts[MSFP_BUILDING_TANGENTS])
         return MSFP_OK;
-    memset(b->matrix, 0, (size_t)r * r * sizeof *b->matrix);
-    for (int k = 0; k < r; ++k) {
-        double *column = b->matrix + (size_t)k * r;
-        const int *rows = columns_of(&b->coupled, k, &count);
-        column[k] = 1.0;
-        for (int l = 0; l < count; ++l)
-            add_columns(r, 1, b->now->mobility + (size_t)rows[l] * r, b->tangent + (size_t)rows[l] * r + k, column);
+    memcpy(l->matrix, l->system, (size_t)r * r * sizeof *l->matrix);
+    for (int i = 0; i < r; ++i) {
+        const int *columns = columns_of(&b->coupled, i, &count);
+        for (int k = 0; k < count; ++k)
+            l->matrix[(size_t)columns[k] * r + i] += share * b->tangent[(size_t)i * r + columns[k]];
     }
-    b->scene.lapack.getrf(&r, &r, b->matrix, &r, b->pivots, &info);
-    b->factored_beta = info ? 0.0 : b->now->beta;
+    b->scene.lapack.getrf(&r, &r, l->matrix, &r, l->pivots, &info);
+    l->tangent = info ? 0 : b->counts[MSFP_BUILDING_TANGENTS];
     return info ? MSFP_E_IRREGULAR : MSFP_OK;
+}
+
+void solve_linear(msfp_building *b, double *x)
+{
+    int r = b->scene.attachments, one = 1, info;
+    char lower[] = "L";
+    b->scene.lapack.potrs(lower, &r, &one, b->now->factors, &r, x, &r, &info);
 }
 
 void solve_tangent(msfp_building *b, double *x)
 {
     int r = b->scene.attachments, one = 1, info;
     char plain[] = "N";
-    b->scene.lapack.getrs(plain, &r, &one, b->matrix, &r, b->pivots, x, &r, &info);
+    b->scene.lapack.getrs(plain, &r, &one, b->now->matrix, &r, b->now->pivots, x, &r, &info);
 }

@@ -1,9 +1,10 @@
 /* msfp_building.h: the run of a linear building on bearings (docs/buildings.md).
  *
- * The building has n coordinates u with M u'' + C u' + K u + forces of the bearings = 0, and each bearing is a two-port
- * (msfp.h) between the ground and the building. All take the steps of one implicit method. In a stage the rates of the
- * coordinates at the bearings, the attachments, are the unknowns: the other coordinates follow from the linear
- * equations, and each bearing from its own stage equations.
+ * The building has n coordinates: attachments u, by which bearings hold it, and oscillators y on them, unit masses on
+ * springs and dampers, M u'' + C u' + K u - P (d s' + k s) + forces of the bearings = 0 and y'' + d s' + k s = 0 with
+ * s = y - P^T u. Each bearing is a two-port (msfp.h) between the ground and the building. All take the steps of one
+ * implicit method. In a stage the rates of the attachments are the unknowns: each oscillator follows from its own
+ * equation, and each bearing from its stage equations.
  *
  * Matrices are dense; those for LAPACK are stored by columns. Functions that return an int return MSFP_OK or a status.
  */
@@ -18,8 +19,10 @@ typedef struct {
     msfp_port *port;
 } msfp_part;
 
-/* Functions of LAPACK. */
+/* Functions of BLAS and LAPACK. */
 typedef struct {
+    void (*syrk)(char *uplo, char *transposed, int *n, int *columns, double *alpha, double *a, int *lda, double *beta,
+                 double *c, int *ldc);
     void (*potrf)(char *uplo, int *n, double *a, int *lda, int *info);
     void (*potrs)(char *uplo, int *n, int *columns, double *a, int *lda, double *b, int *ldb, int *info);
     void (*getrf)(int *m, int *n, double *a, int *lda, int *pivots, int *info);
@@ -46,8 +49,9 @@ enum { MSFP_WRENCH = 6, MSFP_GROUND = 9 }; /* displacement, velocity and acceler
 /* What a run is given; arrays must outlive it. */
 typedef struct {
     int n, attachments, bearings, grounds;
-    const double *mass, *damping, *stiffness; /* [n][n] */
-    const int *attached;                      /* [attachments] coordinates that bearings move with */
+    const double *mass, *damping, *stiffness; /* [attachments][attachments] M, C, K */
+    const double *shares, *shares_turned;     /* P [attachments][n - attachments]; its transpose */
+    const double *dampers, *springs;          /* [n - attachments] d, k */
     const msfp_part *parts;                   /* [bearings] */
     const double *rows;                       /* [bearings][6][attachments] motion of the upper ends */
     const int *ground_of;                     /* [bearings] motion of the ground below */
@@ -85,6 +89,7 @@ enum {
     MSFP_BUILDING_REJECTED,
     MSFP_BUILDING_ITERATIONS,
     MSFP_BUILDING_TANGENTS,
+    MSFP_BUILDING_LENGTHS,
     MSFP_BUILDING_COUNTS
 };
 

@@ -4,6 +4,7 @@
 from cpython.exc cimport PyErr_CheckSignals
 from cpython.pycapsule cimport PyCapsule_GetPointer
 from libc.stdlib cimport calloc, free
+from scipy.linalg.cython_blas cimport dsyrk
 from scipy.linalg.cython_lapack cimport dgetrf, dgetrs, dpotrf, dpotrs
 
 import numpy as np
@@ -23,6 +24,7 @@ cdef extern from "msfp_building.h":
         const double *knots
         const double *coefficients
     ctypedef struct msfp_lapack:
+        void *syrk
         void *potrf
         void *potrs
         void *getrf
@@ -32,7 +34,10 @@ cdef extern from "msfp_building.h":
         const double *mass
         const double *damping
         const double *stiffness
-        const int *attached
+        const double *shares
+        const double *shares_turned
+        const double *dampers
+        const double *springs
         const msfp_part *parts
         const double *rows
         const int *ground_of
@@ -80,7 +85,7 @@ cdef extern from "msfp_building.h":
     void msfp_building_snapshot_write(const msfp_building *, void *) noexcept nogil
     int msfp_building_snapshot_read(msfp_building *, const void *, size_t) noexcept nogil
 
-COUNTS = ("steps", "rejected_steps", "iterations", "tangents")
+COUNTS = ("steps", "rejected_steps", "iterations", "tangents", "step_lengths")
 
 
 cdef const double *_doubles(list held, object values) except? NULL:
@@ -99,8 +104,8 @@ cdef const int *_ints(list held, object values) except? NULL:
 cdef class Run:
     """The run of a building. See msfp_building.h for what it is given.
 
-    matrices (3, n, n): mass, damping, stiffness. attached (r,): coordinates at the bearings. ports: the two-ports of all
-    bearings, which take no other steps. rows (bearings, 6, r). grounds: knots and coefficients of each motion. ground_of (bearings,). entries:
+    The coordinates are r attachments and m oscillators on them. matrices (3, r, r): mass, damping, stiffness. shares (r, m)
+    of the attachments in the oscillators, dampers and springs (m,). ports: the two-ports of all bearings, which take no other steps. rows (bearings, 6, r). grounds: knots and coefficients of each motion. ground_of (bearings,). entries:
     of each bearing, indices into its row. faces (bearings, 7): where the contacts are in it. vectors: those of msfp_building.h: orders (k,), rows (k, 3, n), shares of the motions of the
     ground (k, grounds). node_rows (nodes, 6, n). arms (bearings, 2) [m].
     """
@@ -110,16 +115,18 @@ cdef class Run:
     cdef list held
     cdef size_t nodes
 
-    def __cinit__(self, matrices, attached, ports, rows, grounds, ground_of, entries, faces, vectors, node_rows, arms, *, double weight, stops, jumps,
+    def __cinit__(self, matrices, shares, dampers, springs, ports, rows, grounds, ground_of, entries, faces, vectors, node_rows, arms, *, double weight, stops, jumps,
                   span_ends, span_steps, int method, double rtol, double max_step, double first_step, double max_steps,
                   double end, double output_step, int threads):
         cdef msfp_building_scene s
         cdef int i
         held, self.nodes = [ports], len(node_rows)
         self.held = held
-        s.n, s.attachments, s.bearings, s.grounds = len(matrices[0]), len(attached), len(ports), len(grounds)
+        s.attachments, s.bearings, s.grounds = len(matrices[0]), len(ports), len(grounds)
+        s.n = s.attachments + len(springs)
         s.mass, s.damping, s.stiffness = _doubles(held, matrices[0]), _doubles(held, matrices[1]), _doubles(held, matrices[2])
-        s.attached, s.rows, s.ground_of = _ints(held, attached), _doubles(held, rows), _ints(held, ground_of)
+        s.shares, s.shares_turned, s.rows = _doubles(held, shares), _doubles(held, np.transpose(shares)), _doubles(held, rows)
+        s.dampers, s.springs, s.ground_of = _doubles(held, dampers), _doubles(held, springs), _ints(held, ground_of)
         s.entry_count = _ints(held, [len(each) for each in entries])
         s.entries, s.faces = _ints(held, np.concatenate(entries)), _ints(held, np.ravel(faces))
         s.vectors, s.vector_orders = len(vectors[0]), _ints(held, vectors[0])
@@ -129,6 +136,7 @@ cdef class Run:
         s.end, s.output_step, s.threads, s.method = end, output_step, threads, method
         s.stops, s.stop_count, s.jumps, s.jump_count = _doubles(held, stops), len(stops), _doubles(held, jumps), len(jumps)
         s.span_ends, s.span_steps, s.span_count = _doubles(held, span_ends), _doubles(held, span_steps), len(span_ends)
+        s.lapack.syrk = <void *>dsyrk
         s.lapack.potrf, s.lapack.potrs, s.lapack.getrf, s.lapack.getrs = <void *>dpotrf, <void *>dpotrs, <void *>dgetrf, <void *>dgetrs
         self.parts = <msfp_part *>calloc(s.bearings, sizeof(msfp_part))
         self.grounds = <msfp_piecewise *>calloc(s.grounds, sizeof(msfp_piecewise))

@@ -7,6 +7,9 @@
 /* 2^(1/4): free steps have lengths that are whole powers of it, so that few factorisations are needed. */
 static const double growth = 1.189207115002721;
 
+enum { LEAST_LENGTHS = 3 };
+static const double memory = 1 << 27; /* for factors at the lengths of steps that are kept [bytes] */
+
 /* ---- begin and end ---- */
 
 static int allocate(msfp_building *b)
@@ -17,19 +20,18 @@ static int allocate(msfp_building *b)
         size_t count;
     } arrays[] = { { &b->u, n },           { &b->v, n },        { &b->a, n },       { &b->slope, n },
                    { &b->tangent, r * r }, { &b->force, r },    { &b->Q, n },       { &b->V, n },
-                   { &b->free, n },        { &b->x, r },        { &b->residual, r }, { &b->change, r },
-                   { &b->balance, r },     { &b->scale, r },    { &b->matrix, r * r }, { &b->next_u, n }, { &b->product, n },
-                   { &b->scratch, 3 * r }, { &b->stage_v, stages * n }, { &b->stage_a, stages * n },
+                   { &b->driving, n },     { &b->x, r },        { &b->residual, r }, { &b->change, r },
+                   { &b->scale, r },       { &b->strain, n - r }, { &b->scaled, (n - r) * r }, { &b->next_u, n },
+                   { &b->product, n },     { &b->scratch, 3 * r }, { &b->stage_v, stages * n }, { &b->stage_a, stages * n },
                    { &b->ground, (size_t)b->scene.grounds * MSFP_GROUND }, { &b->peaks, peak_count(b) } };
     int complete = 1;
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i)
-        complete &= (*arrays[i].to = calloc(arrays[i].count, sizeof(double))) != NULL;
+        complete &= (*arrays[i].to = calloc(arrays[i].count + 1, sizeof(double))) != NULL;
     b->members = calloc((size_t)b->scene.bearings, sizeof *b->members);
     b->piece = calloc((size_t)b->scene.grounds, sizeof *b->piece);
-    b->pivots = calloc(r, sizeof *b->pivots);
     b->entries = calloc(entry_count(b), sizeof *b->entries);
     b->faces = calloc((size_t)b->scene.bearings * MSFP_FACES, sizeof *b->faces);
-    return complete && b->members && b->piece && b->pivots && b->entries && b->faces ? MSFP_OK : MSFP_E_MEMORY;
+    return complete && b->members && b->piece && b->entries && b->faces ? MSFP_OK : MSFP_E_MEMORY;
 }
 
 /* Scale of the forces at the attachments: the weight, with its arms where they are moments. */
@@ -112,6 +114,8 @@ msfp_building *msfp_building_new(const msfp_building_scene *scene)
     if (!b)
         return NULL;
     b->scene = *scene;
+    const double each = 3.0 * scene->attachments * scene->attachments * sizeof(double);
+    b->lengths = (int)fmin(LENGTHS, fmax(LEAST_LENGTHS, memory / each));
     if (allocate(b) || find_patterns(b) || pool_begin(b)) {
         msfp_building_free(b);
         return NULL;
@@ -134,8 +138,8 @@ void msfp_building_free(msfp_building *b)
     for (int i = 0; b->members && i < b->scene.bearings; ++i)
         free(b->members[i].row);
     void *all[] = { b->u,       b->v,      b->a,       b->slope,  b->tangent, b->force,   b->Q,       b->V,
-                    b->free,    b->x,      b->residual, b->change, b->balance, b->scale,   b->matrix,  b->next_u, b->product,
-                    b->scratch, b->ground, b->stage_v, b->stage_a, b->members, b->piece,   b->pivots,  b->rows.data, b->steps.data,
+                    b->driving, b->x,      b->residual, b->change, b->scale,  b->strain,  b->scaled,  b->next_u, b->product,
+                    b->scratch, b->ground, b->stage_v, b->stage_a, b->members, b->piece,   b->rows.data, b->steps.data,
                     b->entries, b->faces,  b->peaks,   b->moved.begin, b->moved.columns, b->coupled.begin,
                     b->coupled.columns, b->watched.begin, b->watched.columns, b->of_node.begin, b->of_node.columns };
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
@@ -295,7 +299,7 @@ int msfp_building_replaced(msfp_building *b, int bearing, const int *entries, co
     memcpy(b->faces + bearing * MSFP_FACES, faces, MSFP_FACES * sizeof *faces);
     free(m->row);
     m->row = NULL;
-    b->tangent_beta = b->factored_beta = 0.0;
+    b->tangent_beta = 0.0;
     b->h = fmin(b->h, 1e-3);
     memset(b->slope, 0, (size_t)b->scene.n * sizeof *b->slope);
     b->status = part->api->port_wrench(part->port, m->wrench);

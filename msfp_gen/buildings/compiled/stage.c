@@ -1,9 +1,8 @@
 /* stage.c: one step of the building and its bearings: the stages of the method, and the error.
  *
- * Unknowns of a stage are the rates x of the attachments. Newton's method solves x = x_0 - G f(x): x_0 are the rates
- * without forces of the bearings, G is the mobility of the attachments, f the forces of the bearings, each of which
- * solves its own stage equations for the motion of its upper end. The derivatives of f are kept as long as they reduce
- * the residual.
+ * Unknowns of a stage are the rates x of the attachments. Newton's method solves S x + f(x) = g (linear.c): f are the
+ * forces of the bearings, each of which solves its own stage equations for the motion of its upper end. The derivatives
+ * of f are kept as long as they reduce the residual.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -66,13 +65,6 @@ static void set_ends(msfp_building *b, int bearing, const double *u, const doubl
     }
 }
 
-/* The attachments of a vector of all coordinates. */
-static void pick(const msfp_building *b, const double *all, double *attached)
-{
-    for (int i = 0; i < b->scene.attachments; ++i)
-        attached[i] = all[b->scene.attached[i]];
-}
-
 static void place_now(msfp_building *b, int bearing)
 {
     const int r = b->scene.attachments;
@@ -81,12 +73,8 @@ static void place_now(msfp_building *b, int bearing)
 
 void ends_now(msfp_building *b)
 {
-    const int r = b->scene.attachments;
-    pick(b, b->u, b->scratch);
-    pick(b, b->v, b->scratch + r);
-    pick(b, b->a, b->scratch + 2 * r);
     for (int i = 0; i < b->scene.bearings; ++i)
-        place_now(b, i);
+        set_ends(b, i, b->u, b->v, b->a);
 }
 
 /* ---- tasks of the bearings ---- */
@@ -153,18 +141,16 @@ static int most_unsettled(const msfp_building *b)
 
 /* ---- Newton's method ---- */
 
-/* Forces of the bearings at the rates x, and the residual: in rates, and as the forces that are out of balance, whose
- * size over the weight is returned; infinite where a bearing has no solution. */
+/* Forces of the bearings at the rates x, and the residual: the forces that are out of balance, whose size over the weight
+ * is returned; infinite where a bearing has no solution. */
 static double evaluate(msfp_building *b, double beta)
 {
     const msfp_building_scene *s = &b->scene;
-    int r = s->attachments, one = 1, info;
-    char lower[] = "L";
+    const int r = s->attachments;
     double size = 0.0;
     for (int i = 0; i < r; ++i) {
-        const int c = s->attached[i];
-        b->scratch[i] = b->Q[c] + beta * b->x[i];
-        b->scratch[r + i] = (b->x[i] - b->V[c]) / beta;
+        b->scratch[i] = b->Q[i] + beta * b->x[i];
+        b->scratch[r + i] = (b->x[i] - b->V[i]) / beta;
     }
     for_each_bearing(b, solve_bearing);
     if (first_failure(b))
@@ -180,13 +166,10 @@ static double evaluate(msfp_building *b, double beta)
                 b->force[own[i]] += row[own[i]] * beyond;
         }
     }
-    multiply(r, b->now->mobility, b->force, b->residual);
-    for (int i = 0; i < r; ++i)
-        b->residual[i] += b->x[i] - b->free[s->attached[i]];
-    memcpy(b->balance, b->residual, (size_t)r * sizeof *b->balance);
-    s->lapack.potrs(lower, &r, &one, b->now->mobility_factors, &r, b->balance, &r, &info);
+    multiply(r, b->now->system, b->x, b->residual);
     for (int i = 0; i < r; ++i) {
-        const double share = fabs(b->balance[i]) / b->scale[i];
+        b->residual[i] += b->force[i] - b->driving[i];
+        const double share = fabs(b->residual[i]) / b->scale[i];
         size = share <= size ? size : share; /* also where it is not a number */
     }
     return size < INFINITY ? size : INFINITY;
@@ -217,7 +200,6 @@ static int differentiate(msfp_building *b, double beta)
             }
     }
     b->tangent_beta = beta;
-    b->factored_beta = 0.0;
     return factor_tangent(b);
 }
 
@@ -275,89 +257,104 @@ static int solve_stage(msfp_building *b, double beta)
 
 /* ---- stages ---- */
 
-/* Q, V, and the rates without forces of the bearings; a first guess of the rates of the attachments. */
-static void begin_stage(msfp_building *b, int i, double h)
+/* The forces that drive the rates of attachments and oscillators from Q and V [n]: those of inertia and of springs, on
+ * the attachments also those of the oscillators. */
+static void drive(msfp_building *b, const double *Q, const double *V, double beta)
+{
+    const msfp_building_scene *s = &b->scene;
+    const int r = s->attachments, m = s->n - r;
+    double *driving = b->driving;
+    multiply(r, s->mass, V, driving);
+    multiply(r, s->stiffness, Q, b->product);
+    for (int k = 0; k < r; ++k)
+        driving[k] = driving[k] / beta - b->product[k];
+    strain_of(b, Q, b->strain);
+    for (int k = 0; k < m; ++k) {
+        const double force = s->springs[k] * b->strain[k];
+        driving[r + k] = V[r + k] / beta - force;
+        b->strain[k] = force + b->now->follow[k] * driving[r + k];
+    }
+    add_columns(r, m, s->shares_turned, b->strain, driving);
+}
+
+/* The rates v [n] of the oscillators from those of the attachments; rates of strain stay in b->strain. */
+static void follow(msfp_building *b, double *v)
+{
+    const int r = b->scene.attachments, m = b->scene.n - r;
+    memset(v + r, 0, (size_t)m * sizeof *v);
+    strain_of(b, v, b->strain);
+    for (int k = 0; k < m; ++k) {
+        v[r + k] = b->driving[r + k] * b->now->inverse[k] - b->strain[k] * b->now->follow[k];
+        b->strain[k] += v[r + k];
+    }
+}
+
+/* Q, V and the driving forces; a first guess of the rates of the attachments. */
+static void begin_stage(msfp_building *b, int i, double h, double beta)
 {
     const int n = b->scene.n;
     const msfp_method_stages *m = &b->method;
-    const double beta = m->diagonal * h;
     memcpy(b->Q, b->u, (size_t)n * sizeof *b->Q);
     memcpy(b->V, b->v, (size_t)n * sizeof *b->V);
     for (int j = 0; j < i; ++j) {
         msfp_add(b->Q, b->stage_v + (size_t)j * n, h * m->weights[i][j], n);
         msfp_add(b->V, b->stage_a + (size_t)j * n, h * m->weights[i][j], n);
     }
-    multiply(n, b->scene.mass, b->V, b->free);
-    multiply(n, b->scene.stiffness, b->Q, b->product);
-    for (int k = 0; k < n; ++k)
-        b->free[k] = -(b->free[k] / -beta + b->product[k]);
-    solve_linear(b, b->free);
-    for (int k = 0; k < b->scene.attachments; ++k) {
-        const int c = b->scene.attached[k];
+    drive(b, b->Q, b->V, beta);
+    for (int c = 0; c < b->scene.attachments; ++c) {
         const double *a = b->stage_a + c;
         const double slope = i > 1 ? (a[(size_t)(i - 1) * n] - a[0]) / m->shares[i - 1] : h * b->slope[c];
-        b->x[k] = b->V[c] + beta * (a[0] + m->shares[i] * slope);
+        b->x[c] = b->V[c] + beta * (a[0] + m->shares[i] * slope);
     }
 }
 
-/* The rates v of all coordinates with those that forces at the attachments take from them. */
-static void follow_back(msfp_building *b, const double *force, double *v)
-{
-    for (int k = 0; k < b->scene.attachments; ++k)
-        b->scratch[k] = -force[k];
-    add_columns(b->scene.n, b->scene.attachments, b->now->follow, b->scratch, v);
-}
-
-/* Rates and accelerations of all coordinates in the stage just solved, and powers. */
+/* Rates and accelerations of all coordinates in the stage just solved, with which the forces are in balance, and powers. */
 static void end_stage(msfp_building *b, int i, double beta)
 {
     const msfp_building_scene *s = &b->scene;
-    const size_t n = s->n;
+    const size_t n = s->n, r = s->attachments;
     double *v = b->stage_v + i * n, *a = b->stage_a + i * n, *power = b->power[i];
-    memcpy(v, b->free, n * sizeof *v);
-    follow_back(b, b->force, v);
+    memcpy(v, b->residual, r * sizeof *v);
+    solve_linear(b, v);
+    for (size_t c = 0; c < r; ++c)
+        v[c] = b->x[c] - v[c];
+    follow(b, v);
     for (size_t c = 0; c < n; ++c)
         a[c] = (v[c] - b->V[c]) / beta;
-    multiply(s->n, s->damping, v, b->product);
-    power[DAMPED] = dot(s->n, v, b->product);
-    power[RECEIVED] = power[GROUND] = 0.0;
-    for (int k = 0; k < s->attachments; ++k)
-        power[RECEIVED] -= b->force[k] * v[s->attached[k]];
+    multiply(s->attachments, s->damping, v, b->product);
+    power[DAMPED] = dot(s->attachments, v, b->product);
+    for (size_t k = 0; k < n - r; ++k)
+        power[DAMPED] += s->dampers[k] * b->strain[k] * b->strain[k];
+    power[RECEIVED] = -dot(s->attachments, b->force, v);
+    power[GROUND] = 0.0;
     for (int j = 0; j < s->bearings; ++j)
         power[GROUND] += dot(3, b->members[j].wrench, b->ground + s->ground_of[j] * MSFP_GROUND + 3);
 }
 
 /* Kinetic and strain energy; returns their sum. */
-static double energies_of(msfp_building *b, const double *u, const double *v, double *product, double energies[2])
+static double energies_of(msfp_building *b, const double *u, const double *v, double energies[2])
 {
-    const int n = b->scene.n;
-    multiply(n, b->scene.mass, v, product);
-    energies[0] = 0.5 * dot(n, v, product);
-    multiply(n, b->scene.stiffness, u, product);
-    energies[1] = 0.5 * dot(n, u, product);
+    const msfp_building_scene *s = &b->scene;
+    const int r = s->attachments, m = s->n - r;
+    multiply(r, s->mass, v, b->product);
+    energies[0] = 0.5 * (dot(r, v, b->product) + dot(m, v + r, v + r));
+    multiply(r, s->stiffness, u, b->product);
+    energies[1] = 0.5 * dot(r, u, b->product);
+    strain_of(b, u, b->strain);
+    for (int k = 0; k < m; ++k)
+        energies[1] += 0.5 * s->springs[k] * b->strain[k] * b->strain[k];
     return energies[0] + energies[1];
-}
-
-/* The product of the tangent and a vector of the attachments. */
-static void push(const msfp_building *b, const double *x, double *force)
-{
-    const size_t r = b->scene.attachments;
-    for (size_t i = 0; i < r; ++i) {
-        int count;
-        const int *columns = columns_of(&b->coupled, (int)i, &count);
-        force[i] = dot_at(count, columns, b->tangent + i * r, x);
-    }
 }
 
 /* Error of the building in the norm of energy, over the tolerance. The embedded estimate of a stiff mode is as large as
  * its ringing, which the method damps, so the estimate is filtered as those of the bearings are (Hosea and Shampine
  * 1996): the last stage is solved with its history moved by it. whole: energy at the end of the step [J]. */
-static double building_error(msfp_building *b, double h, double whole)
+static double building_error(msfp_building *b, double h, double beta, double whole)
 {
     const msfp_building_scene *s = &b->scene;
-    const size_t n = s->n, r = s->attachments;
-    const double beta = b->method.diagonal * h;
-    double *eu = b->Q, *ev = b->V, *y = b->free, *moved = b->residual;
+    const size_t n = s->n;
+    const double share = tangent_share(b) / beta;
+    double *eu = b->Q, *ev = b->V, *y = b->product;
     const int last = b->method.count - 1;
     memset(eu, 0, n * sizeof *eu);
     memset(ev, 0, n * sizeof *ev);
@@ -365,50 +362,30 @@ static double building_error(msfp_building *b, double h, double whole)
         msfp_add(eu, b->stage_v + j * n, h * b->method.errors[j], s->n);
         msfp_add(ev, b->stage_a + j * n, h * b->method.errors[j], s->n);
     }
-    multiply(s->n, s->mass, ev, y);
-    multiply(s->n, s->stiffness, eu, b->product);
-    for (size_t c = 0; c < n; ++c)
-        y[c] = y[c] / -beta + b->product[c];
-    pick(b, eu, moved);
-    push(b, moved, b->balance);
-    for (size_t k = 0; k < r; ++k)
-        y[s->attached[k]] += b->balance[k] / beta;
-    for (size_t c = 0; c < n; ++c)
-        y[c] = -y[c];
-    solve_linear(b, y);
-    pick(b, y, moved);
-    solve_tangent(b, moved);
-    push(b, moved, b->balance);
-    follow_back(b, b->balance, y);
+    drive(b, eu, ev, beta);
+    for (int i = 0; i < s->attachments; ++i) {
+        int count;
+        const int *columns = columns_of(&b->coupled, i, &count);
+        b->driving[i] -= share * dot_at(count, columns, b->tangent + (size_t)i * s->attachments, eu);
+    }
+    memcpy(y, b->driving, (size_t)s->attachments * sizeof *y);
+    solve_tangent(b, y);
+    follow(b, y);
     for (size_t c = 0; c < n; ++c)
         eu[c] += beta * y[c];
+    memcpy(ev, y, n * sizeof *ev);
     double of_error[2];
-    const double wrong = energies_of(b, eu, y, ev, of_error);
+    const double wrong = energies_of(b, eu, ev, of_error);
     return sqrt(wrong / fmax(b->energy, whole)) / s->rtol;
 }
 
-/* Take the tangent of the last step for steps of another length: stiffness prevails over damping. */
-static int prepare_tangent(msfp_building *b, double beta)
-{
-    const size_t count = (size_t)b->scene.attachments * b->scene.attachments;
-    if (b->tangent_beta == 0.0)
-        return MSFP_OK;
-    for (size_t i = 0; i < count && beta != b->tangent_beta; ++i)
-        b->tangent[i] *= beta / b->tangent_beta;
-    b->factored_beta = beta == b->tangent_beta ? b->factored_beta : 0.0;
-    b->tangent_beta = beta;
-    return factor_tangent(b);
-}
-
-static int all_stages(msfp_building *b, double h)
+static int all_stages(msfp_building *b, double h, double beta)
 {
     const int n = b->scene.n, r = b->scene.attachments;
-    const double beta = b->method.diagonal * h;
     memcpy(b->stage_v, b->v, (size_t)n * sizeof *b->v);
     memcpy(b->stage_a, b->a, (size_t)n * sizeof *b->a);
     for (int k = 0; k < r; ++k) { /* the ends expected at the end of the step */
-        const int c = b->scene.attached[k];
-        b->scratch[k] = b->u[c] + h * (b->v[c] + 0.5 * h * b->a[c]);
+        b->scratch[k] = b->u[k] + h * (b->v[k] + 0.5 * h * b->a[k]);
         b->scratch[r + k] = b->scratch[2 * r + k] = 0.0;
     }
     b->trying = h;
@@ -417,7 +394,7 @@ static int all_stages(msfp_building *b, double h)
     for (int i = 1; i < b->method.count && !status; ++i) {
         b->solving = i;
         ground_at(b, b->t + b->method.shares[i] * h);
-        begin_stage(b, i, h);
+        begin_stage(b, i, h, beta);
         status = solve_stage(b, beta);
         if (!status)
             end_stage(b, i, beta);
@@ -428,11 +405,10 @@ static int all_stages(msfp_building *b, double h)
 int try_step(msfp_building *b, double h, double *error, double *share, int *worst)
 {
     const int n = b->scene.n;
-    const double beta = b->method.diagonal * h;
     b->bearing = 0;
-    int status = factor_linear(b, beta);
-    status = status ? status : prepare_tangent(b, beta);
-    status = status ? status : all_stages(b, h);
+    int status = factor_linear(b, h);
+    const double beta = b->method.diagonal * b->now->length;
+    status = status ? status : all_stages(b, h, beta);
     if (status)
         return status;
     for (int c = 0; c < n; ++c)
@@ -441,9 +417,8 @@ int try_step(msfp_building *b, double h, double *error, double *share, int *wors
     if ((status = first_failure(b)))
         return status;
     *worst = 0;
-    const double whole =
-        energies_of(b, b->next_u, b->stage_v + (size_t)(b->method.count - 1) * n, b->product, b->next_energies);
-    *error = b->tangent_beta > 0.0 ? building_error(b, h, whole) : 0.0;
+    const double whole = energies_of(b, b->next_u, b->stage_v + (size_t)(b->method.count - 1) * n, b->next_energies);
+    *error = b->tangent_beta > 0.0 ? building_error(b, h, beta, whole) : 0.0;
     *share = 1.0;
     for (int i = 0; i < b->scene.bearings; ++i) {
         if (b->members[i].error > *error) {

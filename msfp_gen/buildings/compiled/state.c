@@ -95,7 +95,7 @@ int write_step(msfp_building *b)
 
 /* ---- snapshots ---- */
 
-static const uint64_t magic = 0x6d73667062756934; /* "msfpbui4" */
+static const uint64_t magic = 0x6d73667062756935; /* "msfpbui5" */
 enum { HEAD = 4 };        /* that, the identity, and the numbers of rows and of steps */
 
 size_t entry_count(const msfp_building *b)
@@ -118,10 +118,12 @@ uint64_t identity_of(const msfp_building *b)
         { &r, sizeof r },
         { &k, sizeof k },
         { &g, sizeof g },
-        { s->mass, n * n * size },
-        { s->damping, n * n * size },
-        { s->stiffness, n * n * size },
-        { s->attached, r * sizeof(int) },
+        { s->mass, r * r * size },
+        { s->damping, r * r * size },
+        { s->stiffness, r * r * size },
+        { s->shares, r * (n - r) * size },
+        { s->dampers, (n - r) * size },
+        { s->springs, (n - r) * size },
         { s->rows, k * MSFP_WRENCH * r * size },
         { s->ground_of, k * sizeof(int) },
         { s->entry_count, k * sizeof(int) },
@@ -178,7 +180,7 @@ static void pass_state(msfp_building *b, tape *t)
 {
     const msfp_building_scene *s = &b->scene;
     const size_t n = s->n * sizeof(double), r = s->attachments * sizeof(double);
-    double *numbers[] = { &b->t, &b->h, &b->previous_error, &b->energy, &b->tangent_beta };
+    double *numbers[] = { &b->t, &b->h, &b->previous_error, &b->energy, &b->tangent_beta, &b->clock };
     int *indices[] = { &b->stop, &b->jump, &b->span, &b->next_row };
     double *arrays[] = { b->u, b->v, b->a, b->slope };
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i)
@@ -187,6 +189,10 @@ static void pass_state(msfp_building *b, tape *t)
         pass(t, indices[i], sizeof(int));
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i)
         pass(t, arrays[i], n);
+    for (int i = 0; i < b->lengths; ++i) {
+        pass(t, &b->linear[i].length, sizeof(double));
+        pass(t, &b->linear[i].used, sizeof(double));
+    }
     pass(t, b->energies, sizeof b->energies);
     pass(t, b->power[0], sizeof b->power[0]);
     pass(t, b->counts, sizeof b->counts);
@@ -200,7 +206,7 @@ static void pass_state(msfp_building *b, tape *t)
 static size_t state_size(const msfp_building *b)
 {
     const msfp_building_scene *s = &b->scene;
-    return 5 * sizeof(double) + 4 * sizeof(int) + 4 * (size_t)s->n * sizeof(double) + sizeof b->energies +
+    return (6 + 2 * (size_t)b->lengths) * sizeof(double) + 4 * sizeof(int) + 4 * (size_t)s->n * sizeof(double) + sizeof b->energies +
            sizeof b->power[0] + sizeof b->counts + (size_t)s->attachments * s->attachments * sizeof(double) +
            (size_t)s->bearings * sizeof b->members[0].wrench + peak_count(b) * sizeof *b->peaks;
 }
@@ -250,7 +256,8 @@ int msfp_building_snapshot_read(msfp_building *b, const void *snapshot, size_t s
     if (room_for(&b->rows, head[2], msfp_building_row_size(b)) || room_for(&b->steps, head[3], step_size(b)))
         return MSFP_E_MEMORY;
     pass_state(b, &t);
-    b->factored_beta = 0.0;
+    for (int i = 0; i < b->lengths; ++i)
+        b->linear[i].factored = 0;
     for (int i = 0; i < b->scene.bearings; ++i) {
         const msfp_part *part = &b->scene.parts[i];
         const size_t own = part->api->port_snapshot_size(part->port);
