@@ -195,7 +195,7 @@ class Building:
 
     @cached_property
     def oscillators(self) -> Oscillators:
-        """The same building as its attachments and an oscillator on them for each mode. Raises InputError, as `fixed`."""
+        """Its attachments and an oscillator on them for each mode. Raises InputError, as `fixed`."""
         return Oscillators.of(self.fixed, self.mass, self.damping, self.stiffness)
 
     @property

@@ -1,4 +1,4 @@
-"""`Oscillators`: a building as its attachments and an oscillator on them for each mode (docs/buildings.md)."""
+"""`FixedBase`, `Oscillators`: modes on fixed attachments, and a building as attachments with oscillators on them."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class FixedBase(NamedTuple):
 
     boundary, inner: indices of the boundary coordinates and of all others. follow: static response of the inner
     coordinates to the boundary, shape (inner, boundary) [SI]. frequencies: circular, ascending, shape (modes,) [rad/s].
-    modes: of unit modal mass, shape (inner, modes) [SI]. still: motions without mass, which complete these, shape (inner,
-    inner - modes) [SI].
+    modes: of unit modal mass, shape (inner, modes) [SI]. still: motions without mass, which complete these, shape
+    (inner, inner - modes) [SI].
     """
 
     boundary: Array
@@ -45,8 +45,9 @@ class Oscillators:
     y - shares.T @ attachments. All else follows the attachments statically. The mass of the attachments is what the
     oscillators do not carry.
 
-    basis: coordinates of the building from these, shape (n, c + m). mass, damping, stiffness: of the attachments, shape
-    (c, c). shares: of the motions of the attachments in each mode, shape (c, m). springs, dampers: shape (m,). All [SI].
+    basis: coordinates of the building from these, shape (n, c + m). mass, damping, stiffness: of the attachments,
+    shape (c, c). shares: of the motions of the attachments in each mode, shape (c, m). springs, dampers: shape (m,).
+    All [SI].
     """
 
     basis: Array
@@ -83,9 +84,7 @@ class Oscillators:
         )
 
 
-def _damping_of(
-    motions: Array, held: int, mass: Array, damping: Array, stiffness: Array, frequency: float
-) -> Array:
+def _damping_of(motions: Array, held: int, mass: Array, damping: Array, stiffness: Array, frequency: float) -> Array:
     """Damping in the coordinates of some motions, shape (motions, motions) [SI]; what rounding leaves is zero.
 
     The first `held` motions are those of attachments. frequency: circular, with which forces of masses and of springs

@@ -84,6 +84,7 @@ struct msfp_building {
     pattern of_node; /* coordinates that each node depends on */
     linear linear[LENGTHS], *now;
     int lengths; /* that are kept */
+    int damped;  /* whether the damping of the attachments is not zero, as that of modes alone is */
     double clock;
     int solving;   /* stage */
     double trying; /* length of the step [s] */

@@ -121,6 +121,8 @@ msfp_building *msfp_building_new(const msfp_building_scene *scene)
         return NULL;
     }
     set_scale(b);
+    for (size_t i = 0; i < (size_t)scene->attachments * scene->attachments; ++i)
+        b->damped |= scene->damping[i] != 0.0;
     b->identity = identity_of(b);
     memcpy(b->entries, scene->entries, entry_count(b) * sizeof *b->entries);
     memcpy(b->faces, scene->faces, (size_t)scene->bearings * MSFP_FACES * sizeof *b->faces);

@@ -321,8 +321,11 @@ static void end_stage(msfp_building *b, int i, double beta)
     follow(b, v);
     for (size_t c = 0; c < n; ++c)
         a[c] = (v[c] - b->V[c]) / beta;
-    multiply(s->attachments, s->damping, v, b->product);
-    power[DAMPED] = dot(s->attachments, v, b->product);
+    power[DAMPED] = 0.0;
+    if (b->damped) {
+        multiply(s->attachments, s->damping, v, b->product);
+        power[DAMPED] = dot(s->attachments, v, b->product);
+    }
     for (size_t k = 0; k < n - r; ++k)
         power[DAMPED] += s->dampers[k] * b->strain[k] * b->strain[k];
     power[RECEIVED] = -dot(s->attachments, b->force, v);
