@@ -99,7 +99,7 @@ def test_uplift_that_opens_on_the_way_is_that_from_the_start(monkeypatch):
     At a tolerance of 1e-3 the height to which light sliders rattle is not resolved: 17 to 82 um, 18 um below 5e-4.
     """
     monkeypatch.setattr(selection, "LEAST_SHARE", -np.inf)
-    for seat, force, path in ((None, 3e-3, 3e-5), (1e9, 1e-2, 2e-4)):
+    for seat, force, path in ((None, 3e-3, 3e-5), (1e9, 1.3e-2, 2e-4)):
         bearing = BEARING.replace(seat_stiffness=seat)
         opened, whole = (simulate(rocking(effects, bearing=bearing)) for effects in (None, LIFTING))
         assert [each.model_changes[0].action for each in opened.bearings if each.model_changes] == 2 * ["uplift = True"]

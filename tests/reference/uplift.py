@@ -37,27 +37,26 @@ def separated(bearing: Any, at: Points, gap: Separation) -> Points:
     return moved
 
 
+def in_footprint(s: Array, axis: Array, half: float) -> Array:
+    """Projection of a vector on the cone of directions within `half` [rad] of an axis."""
+    along, across = s @ axis, s - (s @ axis) * axis
+    if np.arctan2(np.linalg.norm(across), along) <= half:
+        return s
+    normal = np.cos(half) * axis + np.sin(half) * across / np.linalg.norm(across)
+    return max(0.0, float(s @ normal)) * normal
+
+
 def contact_force(bearing: Any, turn: Rotation, gap: Separation, stiffness: Array, damping: Array) -> Array:
     """Force of every unilateral contact on the body above, shape (n-1, 3) [N]."""
     out = np.zeros_like(gap.d)
     for g, surface in enumerate(bearing.surfaces, start=1):
         k, radius, _ = forces.slider(bearing, g)
-        axis, turning = turn.t[k][2], cross(turn.w[k], turn.t[k][2])
-        s, rate = -gap.d[g - 1], -gap.rate[g - 1]
-        half = np.arcsin(radius / surface.radius) + np.arctan(surface.friction)
-        along, across = s @ axis, s - (s @ axis) * axis
-        if np.arctan2(np.linalg.norm(across), along) <= half:
-            depth, normal = np.linalg.norm(s), s / np.linalg.norm(s)
-            depth_rate = normal @ rate
-        else:
-            sideways = across / np.linalg.norm(across)
-            normal = np.cos(half) * axis + np.sin(half) * sideways
-            depth = s @ normal
-            along_rate = rate @ axis + s @ turning
-            across_rate = sideways @ (rate - along_rate * axis - along * turning)
-            depth_rate = np.cos(half) * along_rate + np.sin(half) * across_rate
+        axis, half = turn.t[k][2], np.arcsin(radius / surface.radius) + np.arctan(surface.friction)
+        s = -gap.d[g - 1]
+        depth = np.linalg.norm(in_footprint(s, axis, half))
+        rate = -gap.rate[g - 1] - cross(turn.w[k], s)  # relative to the slider
         if depth > 0:
-            out[g - 1] = stiffness[g - 1] * depth * max(0.0, 1 + damping[g - 1] * depth_rate) * normal
+            out[g - 1] = stiffness[g - 1] * in_footprint(s + damping[g - 1] * depth * rate, axis, half)
     return out
 
 

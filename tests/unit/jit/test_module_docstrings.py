@@ -20,7 +20,7 @@ def returned(docstring: str) -> list[str]:
     """The entries of `Returns: ...`, which commas outside of parentheses separate."""
     _, _, text = " ".join(docstring.split()).partition("Returns: ")
     assert text.endswith("."), docstring
-    return re.split(r", (?![^()]*\))", text.removesuffix("."))
+    return re.split(r", (?!int )(?![^()]*\))", text.removesuffix("."))
 
 
 def shape(entry: str, names: dict[str, int]) -> tuple[int, ...]:
@@ -36,6 +36,7 @@ def test_functions_return_what_their_docstrings_say(effects: dict[str, Any]) -> 
     module, stack = model.extension, model.stack(bearing)
     names = {key: value for key, value in vars(module).items() if key.isupper() and isinstance(value, int)}
     names |= {"n": module.SURFACES + 1, "k": len(VARIABLES)}
+    several = names | {"k": 2}
     q, f = np.zeros((4, module.COORDINATES)), np.full((4, 2), 0.1)
     q[:, 5:] = -1e-5  # with uplift: closed
     state, outside = (q, 0 * q), (np.zeros((3, 6)), np.array([0.0, 0, -1e5, 0, 0, 0]))
@@ -47,6 +48,7 @@ def test_functions_return_what_their_docstrings_say(effects: dict[str, Any]) -> 
         "condensed": (*state, 0 * q, f, *outside, 0.0, 0.0, 1.0, 0.0),
         "report": (*state, f, *outside, unknowns, VARIABLES),
         "vectors": (*state, 0 * q, outside[0]),
+        "many_accelerations": tuple(np.stack([value, value]) for value in (*state, f, *outside)),
     }
     methods = {name for name, _ in inspect.getmembers(type(stack), inspect.isroutine) if not name.startswith("_")}
     assert methods == set(calls)
@@ -54,7 +56,8 @@ def test_functions_return_what_their_docstrings_say(effects: dict[str, Any]) -> 
         entries, found = returned(inspect.getdoc(getattr(stack, name)) or ""), getattr(stack, name)(*arguments)
         assert len(entries) == len(found), (name, entries)
         for entry, value in zip(entries, found, strict=True):
-            assert np.shape(value) == shape(entry, names) or (value is None and entry.endswith("or None")), entry
+            stated = shape(entry, several if name.startswith("many") else names)
+            assert np.shape(value) == stated or (value is None and entry.endswith("or None")), entry
     *_, found = stack.accelerations(*state, f, *outside, report=True)
     assert np.shape(found) == (module.UNKNOWNS,)
 

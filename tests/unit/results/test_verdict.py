@@ -261,7 +261,8 @@ def test_a_contact_off_its_face_in_a_building() -> None:
     """With sliders of 10 mm below and above; with uplift they stand on their edges."""
     bearing = BEARING.replace(rim_radius=[0.01, 0.0255, 0.01, 0.0])
     given = scene(frame(), bearing=bearing, duration=0.8)
-    verdict = simulate(given).verdict
+    closed = [replace(one, effects=Effects(uplift=False)) for one in given.bearings]
+    verdict = simulate(replace(given, bearings=closed)).verdict
     beyond = [one for one in verdict.exceeded if one.limit.key == "face"]
     assert {one.value.surface for one in beyond} <= {1, 4} and all(one.value.allowed == 0.01 for one in beyond)
     assert "contact off the axis of the slider" in verdict.text and 0 < beyond[0].value.time <= 0.8
@@ -405,7 +406,8 @@ def test_no_published_design_is_blamed(name: str | Path) -> None:
     assert result.scene.limits is None and not verdict.exceeded and not verdict.failure, verdict.text
     assert verdict.word == ("stopped" if stopped else "within") and verdict.ok != stopped
     assert verdict.text.endswith("within the limits of the device")
-    assert name not in FIRST or (result.status == "ok" and not result.notes)
+    notes = [note for note in result.notes if note.kind != "vibration"]  # of the tolerance, not of the design
+    assert name not in FIRST or (result.status == "ok" and not notes)
 
 
 def test_a_rim_that_gives_way_is_no_rim() -> None:
@@ -443,7 +445,7 @@ def test_a_run_that_met_its_stop_condition_is_not_within(limit: Limits | None) -
     assert verdict.text.endswith("until then within the limits of the device") == (limit is None)
     if limit is None:
         assert verdict.table.title == "limits of the device: within all until the stop condition"
-        assert "Until then it was within the limits of the device." in outcome(result)
+        assert "Until then: within the limits of the device." in outcome(result)
     else:
         assert outcome(result).endswith(f"Limits of the device exceeded: {verdict.exceeded_text}.")
 
