@@ -265,13 +265,31 @@ def summary(found: Sequence[Outcome]) -> str:
     )
 
 
+def vibrations(numbers: Iterable[int], seed: int) -> Iterator[str]:
+    """Rows of a table, of the masses of the campaign: error of the default run in force, and what its note estimates."""
+    yield "| scene | true error, force RMS | estimate of the note | sliding over yield displacement |\n|---|---|---|---|"
+    for scene in (auto_scenes.campaign(seed, number) for number in numbers):
+        if scene.top.kind != "mass":
+            continue
+        reference = run_native("esdirk4", replace(scene, effects=all_effects(scene)), TRUTH, LIMITS[0], 0)
+        if not reference.finished:
+            yield f"| {scene.name} | - | - | reference run: {reference.status} |"
+            continue
+        true = errors(run_native("implicit", scene, scene.solver.rtol, LIMITS[0], 0), reference)
+        noted = [note.value for note in simulate(scene).notes if note.kind == "vibration"]
+        elastic = max(surface.yield_displacement for surface in scene.bearing.surfaces)
+        error = "-" if true is None else f"{100 * true.force_rms:.3f} %"
+        estimate = f"{100 * noted[0]:.2g} %" if noted else "no note"
+        yield f"| {scene.name} | {error} | {estimate} | {float(reference.sliding.max()) / elastic:.2g} |"
+
+
 def main() -> None:
     """Print the tables."""
     options = parser(__doc__)
     options.add_argument(
         "--count", type=int, default=pick(COUNT, 1), help="number of random scenes that need most effects"
     )
-    options.add_argument("--table", choices=("scenes", "own", "presets", "demanding", "campaign"))
+    options.add_argument("--table", choices=("scenes", "own", "presets", "demanding", "campaign", "vibrations"))
     options.add_argument("--numbers", type=int, nargs="*", default=range(pick(40, 2)), help="scenes of the campaign")
     options.add_argument("--workers", type=int, default=2)
     options.add_argument("--seed", type=int, default=SEED, help="of the campaign")
@@ -282,6 +300,7 @@ def main() -> None:
         "presets": lambda: rows(all_presets(), RESOLVED),
         "demanding": lambda: rows(demanding(given.count)),
         "campaign": lambda: campaign(given.numbers, given.workers, given.seed),
+        "vibrations": lambda: vibrations(given.numbers, given.seed),
     }
     for name, table in tables.items():
         if given.table in (None, name):
