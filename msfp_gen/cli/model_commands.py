@@ -34,19 +34,23 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
+Bodies = Annotated[
+    int, typer.Argument(parser=whole_number, metavar="N", help="Number of bodies, with base and top plate.")
+]
+ConcaveUp = Annotated[
+    int, typer.Argument(parser=whole_number, metavar="M", help="Number of concave-up surfaces, the lower ones.")
+]
+ConcaveDown = Annotated[
+    int, typer.Argument(parser=whole_number, metavar="P", help="Number of concave-down surfaces; n = m + p + 1.")
+]
+
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen generate 5 2 2 -o models   # then: import msfp_5_2_2")
 @with_effects
 def generate(
-    n: Annotated[
-        int, typer.Argument(parser=whole_number, metavar="N", help="Number of bodies, with base and top plate.")
-    ],
-    m: Annotated[
-        int, typer.Argument(parser=whole_number, metavar="M", help="Number of concave-up surfaces, the lower ones.")
-    ],
-    p: Annotated[
-        int, typer.Argument(parser=whole_number, metavar="P", help="Number of concave-down surfaces; n = m + p + 1.")
-    ],
+    n: Bodies,
+    m: ConcaveUp,
+    p: ConcaveDown,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Write the module, its sources and a README there."),
@@ -85,15 +89,9 @@ def generate(
 )
 @with_effects
 def equations(
-    n: Annotated[
-        int, typer.Argument(parser=whole_number, metavar="N", help="Number of bodies, with base and top plate.")
-    ],
-    m: Annotated[
-        int, typer.Argument(parser=whole_number, metavar="M", help="Number of concave-up surfaces, the lower ones.")
-    ],
-    p: Annotated[
-        int, typer.Argument(parser=whole_number, metavar="P", help="Number of concave-down surfaces; n = m + p + 1.")
-    ],
+    n: Bodies,
+    m: ConcaveUp,
+    p: ConcaveDown,
     latex: Annotated[bool, typer.Option("--latex", help="A LaTeX document, in the symbols of PEER 2017/07.")] = False,
     planar: Annotated[bool, typer.Option("--planar", help="The same as --dimension planar.")] = False,
     *,

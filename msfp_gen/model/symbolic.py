@@ -57,7 +57,7 @@ class SymbolicModel:
     parameters
         Values of bodies, surfaces and top, and gravity, on which something depends [SI].
     position, velocity, acceleration
-        Rows r_01, r_1, r_11, r_1c, ..., v_..., a_... of three columns; names as of `Model.kinematics`.
+        Three columns; a row for each named point (r_01, r_1, r_11, r_1c, ...), under the names of `Model.kinematics`.
     rotation
         Rows omega_k, omega'_k, alpha_k, alpha'_k of three columns.
     residual

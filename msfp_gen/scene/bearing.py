@@ -36,8 +36,8 @@ class Surface:
     friction: friction coefficient mu. yield_displacement: d_y of the Bouc-Wen equations [m]; R_gamma/R_0 of (2.94),
     with its values in SI, is 1/d_y. rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103).
     seat_stiffness [N/m], seat_damping [s/m]: k and c of the unilateral contact of models with uplift, whose force is
-    k (s + c |s| ds/dt) at compression s (docs/uplift.md); k = None: `standing.seat_stiffness`. contact_damping: T [s];
-    friction is mu N (Y + T dY/dt) in place of mu N Y (docs/hysteresis.md). The remaining fields are parameters of
+    k (s + c abs(s) ds/dt) at compression s (docs/uplift.md); k = None: `standing.seat_stiffness`. contact_damping: T
+    [s]; friction is mu N (Y + T dY/dt) in place of mu N Y (docs/hysteresis.md). The remaining fields are parameters of
     friction laws (docs/friction.md) and of drilling moments: each is given if, and only if, the law of
     `Effects.friction` or the moment of `Effects.spin` has it. Raises InputError.
     """

@@ -6,6 +6,7 @@ knows the scene of one bearing, and calls the method of the same name of any oth
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -78,7 +79,7 @@ class System(Protocol):
         """It with every effect of the models with which several runs ended; None where nothing is to be added."""
 
 
-class OtherSystem:
+class OtherSystem(ABC):
     """Base of systems that are no `Scene`: what the functions of the core ask of them. A subclass has `start`.
 
     run_options: names of the options of `simulate` that a run has, beside progress and checkpoints.
@@ -86,9 +87,9 @@ class OtherSystem:
 
     run_options: ClassVar[frozenset[str]] = frozenset()
 
+    @abstractmethod
     def start(self, **options: Any) -> Any:
         """The run before its first step, as of `simulation.system.Run`. Raises InputError, RunError."""
-        raise NotImplementedError
 
     def explain(self) -> list[Any]:
         """Tables that describe it, as of `scene.explain.explain`."""

@@ -11,6 +11,8 @@ from importlib.metadata import packages_distributions
 import pytest
 from support import ROOT
 
+import msfp_gen
+
 LINKED = {"generator", "templates"}  # the same folders again, under their import names
 PACKAGE = sorted(p for p in (ROOT / "msfp_gen").rglob("*.py") if not LINKED & set(p.relative_to(ROOT).parts))
 CONSOLE = ROOT / "msfp_gen" / "cli" / "console.py"
@@ -122,6 +124,8 @@ def test_the_core_imports_no_satellite():
 
 
 def test_a_run_loads_the_core_alone():
+    """The model is in the cache: its build loads SymPy and Cython."""
+    msfp_gen.simulate(msfp_gen.load_scene("fenz-test2"))
     code = "import sys, msfp_gen; msfp_gen.simulate(msfp_gen.load_scene('fenz-test2')); print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     packages = {name.split(".")[1] for name in loaded if name.startswith("msfp_gen.")}
