@@ -283,20 +283,25 @@ class _Search:
         if index not in self.references:
             tolerance = CANDIDATE_TOLERANCES[index + REFERENCE_OFFSET]
             self.filtered = self.filtered or (self.rings and not self.resolved.finished)
-            self.references[index] = (
-                self.resolved
-                if self.rings and not self.filtered and tolerance >= RESOLVING
-                else self._run(REFERENCE_METHOD, self._with_short_steps(index), tolerance)
-            )
+            if self.rings and not self.filtered and tolerance >= RESOLVING:
+                self.references[index] = self.resolved
+            else:
+                scene, shorter = self._with_short_steps(index)
+                tolerance = max(tolerance * shorter, CANDIDATE_TOLERANCES[-1])
+                self.references[index] = self._run(REFERENCE_METHOD, scene, tolerance)
         return self.references[index]
 
-    def _with_short_steps(self, index: int) -> Scene:
-        """The reference scene with steps of at most half the mean step of a run, and several in a slider's period."""
-        scene, steps = self.reference_scene, [self.reference_scene.end / (2 * max(self.trial(index).steps, 1))]
+    def _with_short_steps(self, index: int) -> tuple[Scene, float]:
+        """The reference scene with steps of at most half the mean step of a run, and several in a slider's period.
+
+        Also the longest step over that half. Newton's method leaves a share of the tolerance as a residual in every
+        stage. What it leaves adds up over the steps, so the tolerance has to shrink with them.
+        """
+        scene, half = self.reference_scene, self.reference_scene.end / (2 * max(self.trial(index).steps, 1))
+        steps = [half, *([scene.solver.max_step] if scene.solver.max_step is not None else [])]
         if not self.filtered and STEPS_PER_PERIOD * scene.end <= MOST_STEPS * self.period:
             steps.append(self.period / STEPS_PER_PERIOD)
-        steps += [step for step in (scene.solver.max_step,) if step is not None]
-        return replace(scene, solver=replace(scene.solver, max_step=min(steps), first_step=None))
+        return replace(scene, solver=replace(scene.solver, max_step=min(steps), first_step=None)), min(steps) / half
 
     @cached_property
     def resolved(self) -> Trial:
@@ -406,7 +411,7 @@ class _Search:
             "Newton iterations for the same error (docs/accuracy.md)"
         )
         reference = self.references[next(k for k in (index, index - 1) if k in self.references)]
-        compared = f"{reference.method} at rtol {reference.rtol:g} in {reference.steps} steps"
+        compared = f"{reference.method} at rtol {reference.rtol:.2g} in {reference.steps} steps"
         text = f"the run at rtol {CANDIDATE_TOLERANCES[index]:g} was compared with {compared}"
         if self.reference_scene is not self.scene:
             text += " with every effect"
