@@ -21,6 +21,7 @@ from msfp_gen.scene.file import motion_tables, schema
 from msfp_gen.scene.file.motion_tables import LOADS, ROTATIONS, Components, Paths
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Limits, Stop
+from msfp_gen.scene.sheet import Sheet
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, NodeTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Auto, Layout
@@ -74,6 +75,23 @@ MEANINGS = {
     "base_rim_radius": "Radius of the edge of the base that meets a rim, where the base is a slider.",
     "base_rim_offset": "Distance of that edge from its upper face.",
     "base_centroid": "Centre of mass of the base above its bottom (3.2); no result of a run depends on it.",
+    "sheet": "The data sheet of the bearing ([sheet.md](sheet.md)).",
+    "device": "Kind of the bearing.",
+    "bearing.sheet.sheet.radius": "R of each surface. Lists go from the bottom, of all surfaces or of the lower half.",
+    "effective_radius": "R_eff, from the centre of the sphere to the pivot. Two of radius, this and height are given.",
+    "bearing.sheet.sheet.height": "h = R - R_eff of each surface, from it to the pivot.",
+    "bearing.sheet.sheet.friction": "Coefficient of each surface at the pivot.",
+    "bearing.sheet.sheet.friction_lower": "Its lower value, for `msfp-gen bound`.",
+    "bearing.sheet.sheet.friction_upper": "Its upper value.",
+    "friction_lower": "Lower values of friction of all surfaces, bottom first, for `msfp-gen bound` without factors.",
+    "friction_upper": "Upper values.",
+    "slider_diameter": "Of the face that slides in each surface.",
+    "dish_diameter": "Of each surface, to its rim.",
+    "bearing.sheet.sheet.capacity": "Arc of the slider to rim contact, in place of dish_diameter.",
+    "bearing.sheet.sheet.yield_displacement": "Of each surface before it slides.",
+    "bearing.sheet.sheet.axial_load": "At rest; effective properties in kN refer to it.",
+    "plate_height": "Of the base and of the top plate at their axes.",
+    "density": "Of the bodies, whose masses and inertias follow from it.",
     "n": "Number of bodies, with base and top plate; n = m + p + 1.",
     "m": "Number of surfaces that are concave up, the lower ones.",
     "p": "Number of surfaces that are concave down, above them.",
@@ -259,6 +277,7 @@ MEANINGS = {
 SECTIONS: list[tuple[str, str, type]] = [
     ("The scene", "", Scene),
     ("`[bearing]`", "bearing.full", Bearing),
+    ("`sheet` of a bearing", "bearing.sheet.sheet", Sheet),
     ("`layout` of a bearing", "bearing.full.layout", Layout),
     ("`[[bearing.surfaces]]`", "bearing.full.surfaces", Surface),
     ("`[[bearing.bodies]]`", "bearing.full.bodies", Body),
@@ -356,9 +375,11 @@ def page() -> str:
         "## `[bearing]` from a preset\n\n"
         "`preset` and any key of `[bearing]`, `[[bearing.surfaces]]` and `[[bearing.bodies]]`: one value for all\n"
         "surfaces or bodies, or a list with one for each, bottom first. `msfp-gen presets` lists the bearings.\n\n"
-        '```toml\nbearing = { preset = "fenz-tfp", friction = [0.04, 0.02, 0.02, 0.08] }\n```'
+        '```toml\nbearing = { preset = "fenz-tfp", friction = [0.04, 0.02, 0.02, 0.08] }\n```\n\n'
+        "`sheet` in place of `preset` makes the bearing of its data sheet; the same keys change it, except friction,\n"
+        "which is in the sheet."
     )
-    parts.insert(6, preset)
+    parts.insert(7, preset)
     return "\n\n".join(parts) + "\n"
 
 

@@ -67,8 +67,13 @@ def characterise(
 def bound(
     scene: SceneName,
     factors: Annotated[
-        str, typer.Option(metavar="FILE|NAME", help="A table of factors (TOML), or the name of one; see `factors`.")
-    ] = "asce7",
+        str | None,
+        typer.Option(
+            metavar="FILE|NAME",
+            help="A table of factors (TOML), or the name of one; see `factors`. Default: the bounds of the bearing's "
+            "data sheet, else asce7.",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Write runs, numbers and the figure to this folder."),
@@ -79,7 +84,7 @@ def bound(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run a scene at lower bound, nominal and upper bound properties, by lambda factors of a code."""
+    """Run a scene at lower bound, nominal and upper bound properties, of its data sheet or by factors of a code."""
     if suite is not None:
         _bound_suite(scene, factors, output, suite, as_json)
         return
@@ -88,7 +93,8 @@ def bound(
     from msfp_gen.studies.bounding import load_factors
     from msfp_gen.studies.bounding import runs as module
 
-    chosen, table = load_scene(scene), load_factors(factors)
+    chosen = load_scene(scene)
+    table = module.factors_of(chosen) if factors is None else load_factors(factors)
     module.bounded_scenes(chosen, table)  # refuses a table that does not fit the bearing before anything is written
     if output is not None:
         make_folder(output, "--output")
@@ -120,19 +126,20 @@ def factors(
         say(factor_text(name).rstrip("\n"))
 
 
-def _bound_suite(scene: str, factors: str, output: Path | None, suite: Path, as_json: bool) -> None:
+def _bound_suite(scene: str, factors: str | None, output: Path | None, suite: Path, as_json: bool) -> None:
     """`bound` under every motion of a suite: numbers and the figure, without the rows of the runs."""
     from msfp_gen.common.output import make_folder
     from msfp_gen.scene.file.loader import load_suite
     from msfp_gen.studies.batch import build_models
-    from msfp_gen.studies.bounding import bounded_scenes, load_factors
+    from msfp_gen.studies.bounding import bounded_scenes, factors_of, load_factors
     from msfp_gen.studies.bounding import suite as module
     from msfp_gen.studies.sweep import variations
 
-    table = load_factors(factors)
+    given = None if factors is None else load_factors(factors)
     with Progress("suite") as progress:
         records = load_suite(suite, progress).records
     scenes = {str(variation.varied["record"]): variation.scene for variation in variations(scene, (), records)}
+    table = factors_of(next(iter(scenes.values()))) if given is None else given
     for chosen in scenes.values():
         bounded_scenes(chosen, table)
     if output is not None:

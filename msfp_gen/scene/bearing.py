@@ -7,7 +7,7 @@ PEER 2017/07 follows in brackets.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import InitVar, dataclass
+from dataclasses import MISSING, InitVar, dataclass
 from dataclasses import fields as dataclass_fields
 from dataclasses import replace as dataclass_replace
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen.common.errors import InputError
-from msfp_gen.common.fields import check_fields, errors_at, paired, require_type
+from msfp_gen.common.fields import Quantity, check_fields, errors_at, paired, require_type
+from msfp_gen.scene.sheet import BOUNDS, Sheet
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import Layout
 from msfp_gen.specification.values import Bound, rules
@@ -102,6 +103,7 @@ class Body:
         return self.inertia
 
 
+_COEFFICIENTS = Quantity("", least=0.0, shape=(None,))
 _LISTS: dict[str, type] = {"surfaces": Surface, "bodies": Body}
 _SURFACE_ARRAYS = tuple(  # the stiffness of unilateral contacts depends on the top where it is not given
     name for name in contract.names(contract.EVERY_SURFACE) if name != "seat_stiffness"
@@ -114,8 +116,10 @@ class Bearing:
 
     base_height: l_1 [m]. gravity: g [m/s^2]. base_rim_radius, base_rim_offset: r_1, p_1, used where the first surface
     is concave down [m]. base_centroid: z_1, which only defines the named point r_1 (3.2); None: half the height [m].
-    friction_at: "pivot" where the coefficients of `surfaces` are those of a data sheet; the bearing keeps those at the
-    surfaces (`friction_from_pivot`).
+    friction_lower, friction_upper: coefficients of the surfaces at the bounds of a bounding analysis, bottom first;
+    None: it needs factors.
+    friction_at: "pivot" where the coefficients of `surfaces`, and their bounds, are those of a data sheet; the bearing
+    keeps those at the surfaces (`friction_from_pivot`).
     Raises InputError: a wrong number of entries, a value out of range, or a geometry that cannot be built.
     """
 
@@ -127,6 +131,8 @@ class Bearing:
     base_rim_radius: Annotated[float, _BODY["rim_radius"]] = 0.0
     base_rim_offset: Annotated[float, _BODY["rim_offset"]] = 0.0
     base_centroid: Annotated[float | None, _BODY["centroid"]] = None
+    friction_lower: Annotated[tuple[float, ...] | None, _COEFFICIENTS] = None
+    friction_upper: Annotated[tuple[float, ...] | None, _COEFFICIENTS] = None
     friction_at: InitVar[str] = "surface"
 
     def __post_init__(self, friction_at: str) -> None:
@@ -140,12 +146,58 @@ class Bearing:
         for index in range(self.layout.surfaces):
             self._check_geometry(index)
         object.__setattr__(self, "_given_at", friction_at)
+        self._check_friction_bounds()
         if _is_at_pivot(friction_at):
-            radii, friction = zip(*((surface.radius, surface.friction) for surface in self.surfaces), strict=True)
-            heights = (self.base_height, *(body.height for body in self.bodies))
-            converted = friction_from_pivot(self.layout, radii, heights, friction)
+            radii, heights = (
+                [s.radius for s in self.surfaces],
+                (self.base_height, *(body.height for body in self.bodies)),
+            )
+            converted = friction_from_pivot(self.layout, radii, heights, [s.friction for s in self.surfaces])
             rows = zip(self.surfaces, converted, strict=True)
             object.__setattr__(self, "surfaces", tuple(dataclass_replace(row, friction=mu) for row, mu in rows))
+            for name in BOUNDS:
+                if (bound := getattr(self, name)) is not None:
+                    object.__setattr__(self, name, tuple(friction_from_pivot(self.layout, radii, heights, bound)))
+
+    @classmethod
+    def from_sheet(cls, **sheet: Any) -> Bearing:
+        """The bearing of a data sheet, by the names of docs/sheet.md: `from_sheet(device="triple", ...)`.
+
+        Capacities, edges of the sliders, masses and moments of inertia follow from it; `replace` changes them. Raises
+        InputError.
+        """
+        unknown = [name for name in sheet if name not in _names(Sheet)]
+        if unknown:
+            raise InputError(f"sheet.{unknown[0]}: unknown name; give one of {', '.join(_names(Sheet))}")
+        missing = [
+            field.name for field in dataclass_fields(Sheet) if field.default is MISSING and field.name not in sheet
+        ]
+        if missing:
+            raise InputError(f"sheet.{missing[0]} is missing: a data sheet needs it")
+        return cls.of_values(Sheet(**sheet).values)
+
+    @classmethod
+    def of_values(cls, values: dict[str, Any]) -> Bearing:
+        """The bearing of plain values, as a complete `[bearing]` table has them. Raises InputError."""
+        layout = Layout(**values["layout"])
+        rows = {name: [kind(**row) for row in values[name]] for name, kind in _LISTS.items()}
+        return cls(**{**values, "layout": layout, **rows})
+
+    def _check_friction_bounds(self) -> None:
+        """Raise InputError where bounds do not enclose the coefficients of the surfaces."""
+        nominal = [surface.friction for surface in self.surfaces]
+        for name, sign in zip(BOUNDS, (1, -1), strict=True):
+            if (bound := getattr(self, name)) is None:
+                continue
+            if len(bound) != len(nominal):
+                raise InputError(f"bearing.{name} has {len(bound)} entries: give {len(nominal)}, one for each surface")
+            for index, (value, middle) in enumerate(zip(bound, nominal, strict=True)):
+                if sign * value > sign * middle or (not middle and value):
+                    word = "most" if sign > 0 else "least"
+                    raise InputError(
+                        f"bearing.{name}[{index}] = {value:g} (surface {index + 1}): give at {word} its "
+                        f"friction, {middle:g}"
+                    )
 
     def _check_list(self, name: str, kind: type) -> None:
         items = getattr(self, name)
@@ -208,10 +260,14 @@ class Bearing:
         friction_at = changes.pop("friction_at", "surface")
         if _is_at_pivot(friction_at) and not {"friction", "surfaces"} & changes.keys():
             raise InputError("bearing.friction_at = 'pivot': no friction coefficients are given; give friction with it")
+        bounds: dict[str, Any] = {name: getattr(self, name) for name in BOUNDS}
+        if {"friction", "surfaces"} & changes.keys():
+            bounds = dict.fromkeys(BOUNDS)
+        bounds |= {name: changes.pop(name) for name in BOUNDS if name in changes}
         kept = self.friction_given_at if not {"friction", "surfaces"} & changes.keys() else friction_at
         list_of = {column: name for name, kind in _LISTS.items() for column in _names(kind)}
         own = {name: changes.pop(name) for name in _names(Bearing) if name in changes}
-        base = dataclass_replace(self, **own)
+        base = dataclass_replace(self, **{**own, **dict.fromkeys(BOUNDS)})
         rows = {name: list(getattr(base, name)) for name in _LISTS}
         for column, entry in changes.items():
             if column not in list_of:
@@ -222,7 +278,9 @@ class Bearing:
             for index, value in enumerate(values):
                 with errors_at(type(items[index]).__name__.lower(), f"bearing.{list_of[column]}[{index}]"):
                     items[index] = dataclass_replace(items[index], **{column: value})
-        made = dataclass_replace(base, surfaces=rows["surfaces"], bodies=rows["bodies"], friction_at=friction_at)
+        made = dataclass_replace(
+            base, surfaces=rows["surfaces"], bodies=rows["bodies"], friction_at=friction_at, **bounds
+        )
         object.__setattr__(made, "_given_at", kept)
         return made
 

@@ -60,6 +60,8 @@ _STATE = {"q": ("rad", 3), "v": ("rad/s", 3), "h": ("", 2)}
 # Numbers that a run does not depend on smoothly, or not at all: path -> why.
 _WITHOUT = {
     "bearing.base_centroid": "a run does not depend on it",
+    "bearing.friction_lower": "a run does not depend on it",
+    "bearing.friction_upper": "a run does not depend on it",
 }
 _MOTION_FIELDS = {"amplitude": "m", "acceleration": "m/s^2"}  # fields to which the motion is proportional
 _ANALYTIC = ("harmonic", "circle", "figure-eight", "ramp")

@@ -35,6 +35,7 @@ from msfp_gen.scene.file.motion_tables import (
 )
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Limits, Stop
+from msfp_gen.scene.sheet import Sheet
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, Top
 from msfp_gen.specification.layout import SELECTABLE, Auto, Effects, Layout
@@ -143,11 +144,11 @@ def complete_bearing(table: Mapping[str, Any]) -> Table:
 
 def _completed(table: Mapping[str, Any]) -> Table:
     valid = schema.validate_part("bearing", table)
-    at = valid.pop("friction_at", "surface")
+    at = _bearing(valid).friction_given_at if "sheet" in valid else valid.get("friction_at", "surface")
     if at == "surface":
         return dict(plain_values(bearing_table(_bearing(valid))))
-    _bearing({**valid, "friction_at": at})  # raises its errors
-    return {**plain_values(bearing_table(_bearing(valid))), "friction_at": at}
+    _bearing(valid)  # raises its errors
+    return {**plain_values(bearing_table(_bearing({**valid, "friction_at": "surface"}))), "friction_at": at}
 
 
 def complete_part(name: str, table: Mapping[str, Any]) -> Table:
@@ -207,6 +208,12 @@ def _bearing(table: Mapping[str, Any]) -> Bearing:
     changes = dict(table)
     if "preset" in changes:
         return _preset(changes.pop("preset")).replace(**changes)
+    if "sheet" in changes:
+        with errors_at("sheet", "bearing.sheet"):
+            values = Sheet(**changes.pop("sheet")).values
+        if "friction_at" in changes:  # where coefficients stay those of the sheet
+            values["friction_at"] = changes.pop("friction_at")
+        return Bearing.of_values(values).replace(**changes)
     with errors_at("layout", "bearing.layout"):
         changes["layout"] = Layout(**changes["layout"])
     for name, kind, word in (("surfaces", Surface, "surface"), ("bodies", Body, "body")):

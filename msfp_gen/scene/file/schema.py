@@ -34,6 +34,7 @@ from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.scene.file.motion_tables import LOADS, ROTATIONS
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Limits, Stop
+from msfp_gen.scene.sheet import BOUNDS, Sheet
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Auto, Layout
@@ -88,7 +89,7 @@ def _preset_table(value: Any) -> Any:
 
 
 def _bearing_kind(value: Any) -> str:
-    return "preset" if isinstance(value, Mapping) and "preset" in value else "full"
+    return next((key for key in ("preset", "sheet") if isinstance(value, Mapping) and key in value), "full")
 
 
 def rows_of(model: Model) -> Any:
@@ -96,9 +97,9 @@ def rows_of(model: Model) -> Any:
     return GenericAlias(list, (model,))
 
 
-def _bearing_union(full: Model, preset: Model) -> Any:
-    """A complete bearing or a preset with changes; a text alone is the name of a preset."""
-    union = reduce(or_, (Annotated[full, Tag("full")], Annotated[preset, Tag("preset")]))
+def _bearing_union(**kinds: Model) -> Any:
+    """A complete bearing, or a preset or a data sheet with changes; a text alone is the name of a preset."""
+    union = reduce(or_, (Annotated[model, Tag(word)] for word, model in kinds.items()))
     return Annotated[union, Discriminator(_bearing_kind), BeforeValidator(_preset_table)]
 
 
@@ -122,7 +123,9 @@ _CHANGES: Table = {name: (_read(rule.parse), None) for name, rule, _ in ruled_fi
 _PRESET: Model = create_model(
     "PresetBearing", __base__=_Strict, preset=(_read(Text().parse), ...), friction_at=_FRICTION_AT, **_CHANGES
 )
-_EITHER = _bearing_union(_BEARING, _PRESET)
+_BESIDE_SHEET = {name: field for name, field in _CHANGES.items() if name not in ("friction", *BOUNDS)}
+_SHEET: Model = create_model("SheetBearing", __base__=_Strict, sheet=(model_of(Sheet), ...), **_BESIDE_SHEET)
+_EITHER = _bearing_union(full=_BEARING, preset=_PRESET, sheet=_SHEET)
 _ROTATION = _union(ROTATIONS.values())
 _LOAD = _union(LOADS.values())
 MOTION = _union(motion_tables.KINDS.values())

@@ -1,10 +1,10 @@
 """Bounding analysis: lambda factors -> scenes at lower bound, nominal and upper bound -> runs (docs/bounding.md)."""
 
-from msfp_gen.studies.bounding.factors import Factor, FactorTable, factor_tables, factor_text, load_factors
-from msfp_gen.studies.bounding.runs import CASES, Bounds, Case, bound, bounded_scene, bounded_scenes
+from msfp_gen.studies.bounding.factors import SHEET, Factor, FactorTable, factor_tables, factor_text, load_factors
+from msfp_gen.studies.bounding.runs import CASES, Bounds, Case, bound, bounded_scene, bounded_scenes, factors_of
 from msfp_gen.studies.bounding.suite import SuiteBounds, bound_suite
 
 __all__ = [
-    "CASES", "Bounds", "Case", "Factor", "FactorTable", "SuiteBounds", "bound", "bound_suite", "bounded_scene",
-    "bounded_scenes", "factor_tables", "factor_text", "load_factors",
+    "CASES", "SHEET", "Bounds", "Case", "Factor", "FactorTable", "SuiteBounds", "bound", "bound_suite", "bounded_scene",
+    "bounded_scenes", "factor_tables", "factor_text", "factors_of", "load_factors",
 ]  # fmt: skip

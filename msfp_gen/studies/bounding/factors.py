@@ -117,6 +117,9 @@ class FactorTable:
         return prod(1 + self.adjustment * (value - 1) for value in adjusted) * prod(direct)
 
 
+SHEET = FactorTable("sheet", "lower and upper friction of the bearing's data sheet, no factors", "", "", 1.0, None, ())
+
+
 def factor_tables() -> dict[str, str]:
     """Name -> description of the tables that come with the package."""
     return {name: load_factors(name).description for name in _bundled()}
@@ -132,11 +135,14 @@ def factor_text(name: str) -> str:
 
 
 def load_factors(source: str | Path) -> FactorTable:
-    """Read a table of factors. source: a TOML file, or the name of a table that comes with the package.
+    """Read a table of factors. source: a TOML file, the name of a table that comes with the package, or "sheet".
 
-    Raises InputError of one line that names file, field, value and remedy.
+    "sheet" stands for the bounds of friction that the bearing itself has. Raises InputError of one line that names
+    file, field, value and remedy.
     """
     path = Path(source)
+    if str(source) == SHEET.name:
+        return SHEET
     if str(source) in _bundled() or not is_input(path):
         return _read(str(source), toml_table(factor_text(str(source))))
     with prefixed(f"{path}: "):

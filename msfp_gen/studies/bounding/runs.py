@@ -39,7 +39,7 @@ from msfp_gen.scene.fidelity import check_stack
 from msfp_gen.scene.friction_parameters import proportional
 from msfp_gen.specification.friction_laws import Law
 from msfp_gen.studies.batch import ENDED, completed_runs
-from msfp_gen.studies.bounding.factors import PROPERTIES, RULES, FactorTable
+from msfp_gen.studies.bounding.factors import PROPERTIES, RULES, SHEET, FactorTable, load_factors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -169,13 +169,20 @@ class Bounds:
         }
 
 
-def bound(scene: System, table: FactorTable, *, progress: Progress | None = None) -> Bounds:
+def factors_of(scene: System) -> FactorTable:
+    """The bounds that the bearings of a scene have, or the factors of ASCE 7 where one has none."""
+    has = all(bearing.friction_lower and bearing.friction_upper for bearing in scene.every_bearing)
+    return SHEET if has else load_factors("asce7")
+
+
+def bound(scene: System, table: FactorTable = SHEET, *, progress: Progress | None = None) -> Bounds:
     """Run a scene with its properties at lower bound, nominal value and upper bound; of a building, of all bearings.
 
     A case that fails is part of the result, and the other cases are run. All cases have the same effects: where `Auto`
     ends with different models, all cases run again with every effect that any of them needs.
 
-    progress: called with the share of the runs that is done, and 1. Raises InputError: a factor of a surface that the
+    table: of factors; without it the lower and upper friction of the bearing itself. progress: called with the share
+    of the runs that is done, and 1. Raises InputError: a bearing without bounds, a factor of a surface that the
     bearing does not have, a pendulum that is "equivalent" to a stack, or a bearing that does not move; RunError: no
     case has rows.
     """
@@ -278,6 +285,8 @@ def _scaled(bearing: Bearing, field: str, factors: tuple[float, ...]) -> Bearing
 def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[float, ...]]]:
     """Property -> case -> factor of every surface [-]; 1 for a surface without a factor. Raises InputError."""
     count = bearing.layout.surfaces
+    if table is SHEET:
+        return {"friction": dict(zip(CASES, _sheet_ratios(bearing), strict=True))}
     pairs: dict[str, dict[int, tuple[float, float]]] = {}
     for index, factor in enumerate(table.factors):
         for surface in factor.surfaces or range(1, count + 1):
@@ -295,6 +304,25 @@ def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[
         lower, upper = zip(*(of_surfaces.get(surface, (1.0, 1.0)) for surface in range(1, count + 1)), strict=True)
         lambdas[name] = {"lower": lower, "nominal": (1.0,) * count, "upper": upper}
     return lambdas
+
+
+def _sheet_ratios(bearing: Bearing) -> tuple[tuple[float, ...], ...]:
+    """Lower, nominal and upper friction over the nominal one of every surface, where it is given. Raises InputError."""
+    given = _given_friction(bearing)
+    cases = []
+    for name, values in (("friction_lower", bearing.friction_lower), ("friction_upper", bearing.friction_upper)):
+        if values is None:
+            raise InputError(f"bearing.{name} is missing: give the bounds of friction, or a table of factors")
+        at = _given_friction(_with_nominal(bearing, values))
+        cases.append(tuple(bound / mu if mu else 1.0 for bound, mu in zip(at, given, strict=True)))
+    return cases[0], (1.0,) * len(given), cases[1]
+
+
+def _with_nominal(bearing: Bearing, friction: tuple[float, ...]) -> Bearing:
+    """The bearing with other coefficients at its surfaces, which are given where its own are."""
+    other = bearing.replace(friction=friction)
+    object.__setattr__(other, "_given_at", bearing.friction_given_at)
+    return other
 
 
 # SI unit -> (unit shown, scale).
@@ -343,13 +371,10 @@ def write_quantities(bounds: Bounds, path: str | Path) -> Path:
 
 
 def _factor_table(table: FactorTable) -> Table:
-    rows = [
-        ("table", table.name),
-        ("", table.description),
-        ("rule", f"{table.rule}: {RULES[table.rule].formula}"),
-        ("adjustment", f"{table.adjustment:g}"),
-        ("source", table.source),
-    ]
+    rows = [("table", table.name), ("", table.description)]
+    if table.rule:
+        rows += [("rule", f"{table.rule}: {RULES[table.rule].formula}"), ("adjustment", f"{table.adjustment:g}")]
+    rows.append(("source", table.source))
     if table.limits is not None:
         rows.append(("limits", f"lambda_min at most {table.limits[0]:g}, lambda_max at least {table.limits[1]:g}"))
     for factor in table.factors:

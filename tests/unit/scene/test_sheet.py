@@ -1,0 +1,255 @@
+"""A bearing by its data sheet: published devices, what follows from a sheet, bad sheets, its place in scene files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import asin, pi, sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+
+from msfp_gen import Bearing, InputError, load_scene, presets
+from msfp_gen.results.geometry import outline
+from msfp_gen.scene.effective import characteristic, effective, published_backbone, regimes
+from msfp_gen.scene.file.loader import bearing_from_table, complete_bearing, scene_from_table
+from msfp_gen.scene.sheet import Sheet, revolved
+from msfp_gen.studies.bounding import SHEET, bounded_scenes, factors_of
+from msfp_gen.studies.bounding.runs import _lambdas
+
+# Tables A.1 to A.8 of PEER 2017/07; heights are sums of its l, diameters twice its r.
+APPENDIX: dict[str, dict[str, Any]] = {
+    "fenz-tfp": {
+        "radius": [0.473, 0.076],
+        "height": [0.038, 0.023],
+        "friction": [0.03, 0.017, 0.017, 0.107],
+        "slider_diameter": [0.102, 0.051],
+        "capacity": [0.065, 0.0215],
+        "plate_height": 0.013,
+        "axial_load": 112e3,
+    },
+    "becker-tfp": {
+        "radius": [0.9906, 0.0762],
+        "height": [0.0254, 0.0127],
+        "friction": [0.118, 0.036, 0.036, 0.137],
+        "slider_diameter": [0.0762, 0.0382],
+        "capacity": [0.0918, 0.0135],
+        "plate_height": 0.011,
+        "axial_load": 112e3,
+    },
+}
+FENZ = {"device": "triple", **APPENDIX["fenz-tfp"]}
+BOUNDED = {**FENZ, "friction_lower": [0.02, 0.01, 0.01, 0.08], "friction_upper": [0.04, 0.02, 0.02, 0.13]}
+SINGLE = {
+    "device": "single", "radius": [2.2], "height": [0.0], "friction": [0.06], "slider_diameter": [0.24],
+    "dish_diameter": [1.0], "axial_load": 2e6,
+}  # fmt: skip
+DOUBLE = {
+    "device": "double", "radius": [2.2], "height": [0.1], "friction": [0.04, 0.08], "slider_diameter": [0.24],
+    "capacity": [0.2], "axial_load": 2e6,
+}  # fmt: skip
+QUINTUPLE = {
+    "device": "quintuple", "radius": [2.2, 1.0, 0.3], "height": [0.16, 0.10, 0.05],
+    "friction": [0.09, 0.04, 0.02, 0.02, 0.06, 0.12], "slider_diameter": [0.58, 0.26, 0.16],
+    "capacity": [0.22, 0.15, 0.045], "axial_load": 2e6,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", APPENDIX)
+def test_appendix_of_the_report_follows_from_a_sheet(name: str) -> None:
+    """Heights, radii and capacities are those of the preset; the edges of sliders agree with its printed digits."""
+    made, given = Bearing.from_sheet(device="triple", **APPENDIX[name]), presets.bearing(name)
+    for field in ("radius", "capacity", "height", "centroid"):
+        if field != "centroid":
+            np.testing.assert_allclose(made.arrays()[field], given.arrays()[field], rtol=1e-12)
+    np.testing.assert_allclose(made.arrays()["rim_radius"], given.arrays()["rim_radius"], atol=1e-12)
+    np.testing.assert_allclose(made.arrays()["rim_offset"], given.arrays()["rim_offset"], atol=5e-5)
+    assert made.friction_at_pivot == pytest.approx(APPENDIX[name]["friction"])
+
+
+def test_arc_of_the_dish_is_the_capacity_of_the_report() -> None:
+    """Dishes of 229 and 89 mm, as the device has in its drawing, give the capacities of Table A.1 as printed."""
+    sheet = Sheet(**{**FENZ, "capacity": None, "dish_diameter": [0.229, 0.089]})
+    assert sheet.capacity is not None and np.round(np.array(sheet.capacity[:2]) * 1e3, 1).tolist() == [64.5, 21.5]
+    again = Sheet(**{**FENZ, "capacity": sheet.capacity})
+    assert again.dish_diameter == pytest.approx((0.229, 0.089, 0.089, 0.229))
+
+
+@pytest.mark.parametrize("height", [(0.05, 0.02), (0.15, 0.08)])
+@pytest.mark.parametrize(
+    ("lengths", "limits", "friction"),
+    [
+        # H.-M. Kim and M. C. Constantinou (2023), configuration A: the example of OpenSees' TripleFrictionPendulumX.
+        ((3.7465, 0.3937), (0.5043, 0.0716), (0.04, 0.01, 0.01, 0.08)),
+        # N. Dao (2013): the example that checks OpenSees' TripleFrictionPendulum.
+        ((1.25, 0.36), (0.2, 0.1), (0.052, 0.012, 0.012, 0.14)),
+    ],
+)
+def test_devices_of_opensees(
+    lengths: tuple[float, float], limits: tuple[float, float], friction: tuple[float, ...], height: tuple[float, float]
+) -> None:
+    """Their effective radii and displacement limits are published, heights are not: nothing here depends on them.
+
+    The capacity is that of the manual of the element, 2 d_1 + d_2 + d_3, where sliders move on the effective radii; the
+    regimes are those of Fenz and Constantinou (2008), written out.
+    """
+    arcs = [d * (L + h) / L for d, L, h in zip(limits, lengths, height, strict=True)]
+    backbone = published_backbone(
+        Bearing.from_sheet(
+            device="triple", effective_radius=lengths, height=height, friction=friction, capacity=arcs,
+            slider_diameter=(0.30, 0.20), axial_load=1e6,
+        )
+    )  # fmt: skip
+    (outer, inner), (mu1, mu2, _, mu4) = lengths, friction
+    first = 2 * (mu1 - mu2) * inner
+    second = first + (mu4 - mu1) * (outer + inner)
+    drawn = regimes(backbone)
+    assert drawn[1][0] == pytest.approx(first) and drawn[2][0] == pytest.approx(second)
+    assert [k for *_, k in drawn[:3]] == pytest.approx([1 / (2 * inner), 1 / (outer + inner), 1 / (2 * outer)])
+    assert backbone.capacity == pytest.approx(2 * sum(limits))
+    mean = (mu1 + mu4) / 2 - ((mu1 + mu4) / 2 - mu2) * inner / outer
+    assert characteristic(backbone) == pytest.approx((mean, 2 * outer))
+
+
+def test_single_and_double_are_one_regime() -> None:
+    """F/W = mu + u/R_eff; a rigid slider turns on both dishes at once, whatever their friction."""
+    single = published_backbone(Bearing.from_sheet(**SINGLE))
+    arc = 2.2 * (asin(0.5 / 2.2) - asin(0.12 / 2.2))
+    assert single.points[0].tolist() == pytest.approx([0.0, arc])
+    assert single.points[1].tolist() == pytest.approx([0.06, 0.06 + arc / 2.2])
+    double = published_backbone(Bearing.from_sheet(**DOUBLE))
+    assert characteristic(double) == pytest.approx((0.06, 4.2))
+    assert double.capacity == pytest.approx(2 * 2.1 / 2.2 * 0.2)
+
+
+def test_effective_properties_by_hand() -> None:
+    """k_eff = W (mu + D/R)/D, T = 2 pi sqrt(W/(g k)), beta = 2 mu/(pi (mu + D/R)) of a single pendulum."""
+    found = effective(published_backbone(Bearing.from_sheet(**SINGLE)), 0.3, 9.81)
+    force = 0.06 + 0.3 / 2.2
+    assert found.force == pytest.approx(force) and found.stiffness == pytest.approx(force / 0.3)
+    assert found.period == pytest.approx(2 * pi * sqrt(0.3 / (9.81 * force)))
+    assert found.energy == pytest.approx(4 * 0.06 * 0.3) and found.damping == pytest.approx(2 * 0.06 / (pi * force))
+
+
+@pytest.mark.parametrize("sheet", [FENZ, DOUBLE, QUINTUPLE])
+@pytest.mark.parametrize("share", [0.1, 0.4, 0.7, 1.0])
+def test_damping_is_the_area_of_a_loop_of_links_in_series(sheet: dict[str, Any], share: float) -> None:
+    """The loop drawn step by step: every link a slider of rigid friction, a pendulum and stops, under one force."""
+    backbone = published_backbone(Bearing.from_sheet(**sheet))
+    found = effective(backbone, share * backbone.capacity, 9.8)
+    tilt = np.zeros(len(backbone.links))
+    path = np.concatenate([np.linspace(a, b, 4001) for a, b in ((0, 1), (1, -1), (-1, 1), (1, -1))]) * found.force
+    u = np.empty_like(path)
+    for row, force in enumerate(path):
+        for index, link in enumerate(backbone.links):
+            outside = 0.0 if link.outside is None else tilt[link.outside]
+            moved = min(max(tilt[index], force - link.friction), force + link.friction)
+            tilt[index] = min(max(moved, outside - link.limit), outside + link.limit)
+        u[row] = sum(link.share * angle for link, angle in zip(backbone.links, tilt, strict=True))
+    cycle = slice(2 * 4001, None)
+    assert u[4000] == pytest.approx(found.displacement)
+    assert abs(np.trapezoid(path[cycle], u[cycle])) == pytest.approx(found.energy, rel=2e-3)
+
+
+def test_masses_of_steel() -> None:
+    """A half ball and a disc in closed form; and a body as it is drawn, cut into slices."""
+    mass, centroid, (transverse, axial) = revolved(0.1, (0.1, 0.1, 1.0), None, 7850.0)
+    ball = 7850 * 2 / 3 * pi * 1e-3
+    assert (mass, centroid) == pytest.approx((ball, 5 / 8 * 0.1), rel=1e-4)
+    assert axial == pytest.approx(0.4 * ball * 0.01, rel=1e-4)
+    assert transverse == pytest.approx(83 / 320 * ball * 0.01, rel=1e-4)
+    made = Bearing.from_sheet(**FENZ)
+    for index, body in enumerate(made.bodies[:3], start=1):
+        radius, height = outline(made, index).T
+        slices = pi * np.trapezoid(radius**2, height)
+        assert body.mass == pytest.approx(7850 * abs(slices), rel=0.06)  # the drawing has rims, the mass none
+
+
+def test_centroids_follow_the_report() -> None:
+    """z is from the bottom below the pivot and from the top above it (3.6), (3.10): equal in a symmetric stack."""
+    bodies = Bearing.from_sheet(**FENZ).bodies
+    assert bodies[0].centroid == pytest.approx(bodies[2].centroid) and bodies[1].centroid == pytest.approx(0.023)
+    assert bodies[0].centroid > bodies[0].height / 2  # the dish of the inner slider has its steel at its rim
+
+
+@pytest.mark.parametrize(
+    ("sheet", "changes", "message"),
+    [
+        (FENZ, {"friction": [0.1]}, "sheet.friction has 1 entries: a triple pendulum needs 4, or 2 of a symmetric"),
+        (FENZ, {"radius": None}, "height of radius, effective_radius, height is given; give two of them"),
+        (FENZ, {"height": [0.02, 0.023]}, "farther from the pivot than the one inside"),
+        (FENZ, {"slider_diameter": [0.102, 0.05, 0.051, 0.102]}, "both are faces of one rigid slider"),
+        (FENZ, {"friction": [0.03, 0.01, 0.02, 0.1]}, "sheet.friction of surfaces 2 and 3 = 0.01, 0.02"),
+        (FENZ, {"dish_diameter": [0.229, 0.089]}, "give either dish_diameter or capacity"),
+        (FENZ, {"capacity": None, "dish_diameter": [0.1, 0.089]}, "give more than the slider_diameter, 0.102"),
+        (FENZ, {"friction_lower": [0.02, 0.01]}, "give both friction_lower and friction_upper, or neither"),
+        (BOUNDED, {"friction_lower": [0.04, 0.01, 0.01, 0.08]}, "give at most its friction, 0.03"),
+        (FENZ, {"slider_diameter": [1.0, 0.051]}, "give less than twice the radius, 0.946"),
+        (FENZ, {"effective_radius": [0.5, 0.05], "height": None}, r"radius = effective_radius \+ height"),
+        (FENZ, {"rims": 1}, "sheet.rims: unknown name; give one of device"),
+        (FENZ, {"device": "quadruple"}, "sheet.device = 'quadruple': give one of 'single'"),
+        (SINGLE, {"friction": [0.06, 0.06]}, "a single pendulum needs 1"),
+    ],
+)
+def test_bad_sheets(sheet: dict[str, Any], changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Bearing.from_sheet(**{**sheet, **changes})
+
+
+def test_missing_name() -> None:
+    with pytest.raises(InputError, match=r"sheet\.axial_load is missing"):
+        Bearing.from_sheet(**{name: value for name, value in FENZ.items() if name != "axial_load"})
+
+
+def test_scene_file_takes_a_sheet_with_changes() -> None:
+    """Texts with units, other keys that change the bearing; its complete table keeps friction at the pivot."""
+    table = {"sheet": {**BOUNDED, "radius": ["0.473 m", 0.076]}, "mass": [1.0, 2.0, 1.0, 8.0], "gravity": 9.81}
+    made = bearing_from_table(table)
+    assert made == Bearing.from_sheet(**BOUNDED).replace(mass=[1.0, 2.0, 1.0, 8.0], gravity=9.81)
+    whole = complete_bearing(table)
+    assert whole["friction_at"] == "pivot" and bearing_from_table(whole) == made
+    assert [row["friction"] for row in whole["surfaces"]] == BOUNDED["friction"]
+    for wrong in ({"friction": 0.1}, {"friction_at": "surface"}):
+        with pytest.raises(InputError, match="unknown key"):
+            bearing_from_table({**table, **wrong})
+
+
+def scene_of(sheet: dict[str, Any]) -> Any:
+    ramp = {"kind": "ramp", "acceleration": 0.1, "duration": 1.0}
+    top = {"kind": "rig", "axial_load": 2e6, "stiffness": 1e9, "damping": 1e3}
+    return scene_from_table({"bearing": {"sheet": sheet}, "motion": ramp, "top": top})
+
+
+@pytest.mark.parametrize(
+    "sheet", [BOUNDED, {**SINGLE, "friction_lower": [0.04], "friction_upper": [0.09]}], ids=["triple", "single"]
+)
+def test_bound_takes_the_values_of_the_sheet(sheet: dict[str, Any]) -> None:
+    """The bearing at each bound is that of a sheet with these values as its friction; no factor is applied."""
+    scene = scene_of(sheet)
+    assert factors_of(scene) is SHEET
+    scenes = bounded_scenes(scene, SHEET)
+    plain = {name: value for name, value in sheet.items() if not name.startswith("friction")}
+    for case, name in (("lower", "friction_lower"), ("nominal", "friction"), ("upper", "friction_upper")):
+        expected = Bearing.from_sheet(**plain, friction=sheet[name])
+        found = scenes[case].every_bearing[0]
+        np.testing.assert_allclose(found.arrays()["friction"], expected.arrays()["friction"], rtol=1e-12)
+    lower = _lambdas(scene.bearing, SHEET)["friction"]["lower"]
+    ratios = np.divide(sheet["friction_lower"], sheet["friction"])
+    assert lower[: len(ratios)] == pytest.approx(ratios.tolist())
+
+
+def test_a_bearing_without_bounds_takes_factors() -> None:
+    scene = load_scene("fenz-test1")
+    assert factors_of(scene).name == "asce7"
+    with pytest.raises(InputError, match="friction_lower is missing"):
+        bounded_scenes(scene, SHEET)
+
+
+def test_bounds_go_where_friction_changes() -> None:
+    """Bounds belong to the coefficients with which they were given."""
+    made = Bearing.from_sheet(**BOUNDED)
+    assert made.replace(gravity=9.81).friction_lower == made.friction_lower
+    assert made.replace(friction=0.05).friction_lower is None
+    assert replace(made, friction_lower=None).friction_upper == made.friction_upper
+    again = made.replace(friction=0.05, friction_lower=[0.04] * 4, friction_upper=[0.06] * 4, friction_at="pivot")
+    assert again.friction_lower is not None and again.friction_at_pivot == pytest.approx((0.05,) * 4)
