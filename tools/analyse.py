@@ -1,6 +1,6 @@
 """Static analysis of the C code: `gcc -fanalyzer`, clang-tidy and cppcheck (`make analyse`).
 
-They read what a compiler reads: models with the runtime, the drivers of buildings and of estimation, and units (FMU),
+They read what a compiler reads: models with the runtime, the driver of buildings, and units (FMU),
 in `build/analysis`. One model is planar without masses, one has every other effect, both have gradients: each line of
 the runtime is in one of them. A program that is missing is named and left out. Exit code 1: there are findings.
 """
@@ -39,7 +39,7 @@ MODELS = {
     ),
 }
 SLOW = ("full",)  # for cppcheck, which follows every value through the kernels: minutes
-DRIVERS = {"buildings": "msfp_gen.buildings", "estimation": "msfp_gen.studies.estimation"}
+DRIVERS = {"buildings": "msfp_gen.buildings"}
 LANGUAGE = ("-std=c99", "-Wall", "-Wextra")
 # -O1: functions are inlined, as where the analyser is run by its authors. Off: of gcc 12, the check of values that are
 # not set does not follow arrays that a loop of a count in data fills; clang-tidy asks the same question, and

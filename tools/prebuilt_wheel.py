@@ -27,7 +27,7 @@ TAGS = ("cp311-abi3-manylinux_2_17_x86_64", "cp311-abi3-manylinux2014_x86_64")
 OPTIONS = (
     "cc", "-target", "x86_64-linux-gnu.2.17", "-fno-sanitize=undefined", "-s", "-DPy_LIMITED_API=0x030B0000",
 )  # fmt: skip
-DRIVERS = ("msfp_gen.buildings", "msfp_gen.studies.estimation")  # packages with compiled code beside the models
+DRIVERS = ("msfp_gen.buildings",)  # packages with compiled code beside the models
 PROCESSORS = {1: "x86_64", 3: "x86_64_v3"}
 
 

@@ -15,7 +15,6 @@ from msfp_gen.scene.fidelity import (
     constant_friction,
     equivalent_pendulum,
     implicit_solver,
-    labelled,
     peak_speed,
     without_inertia,
 )
@@ -26,12 +25,10 @@ from msfp_gen.specification.layout import Auto, Effects
 
 
 def at_fidelity(scene: BuildingScene, word: str) -> BuildingScene | Scene:
-    """The scene at a level of fidelity: "backbone", "loose", "massless", "rigid", or "equivalent".
+    """The scene at a level of fidelity: "loose", "massless", "rigid", or "equivalent".
 
     "equivalent" gives the scene of one bearing that carries the whole building. Raises InputError of one line.
     """
-    if word == "backbone":
-        return labelled(scene, word)
     if word == "equivalent":
         return _equivalent(scene)
     if word == "loose" and scene.solver.rtol >= LOOSE:
@@ -51,28 +48,17 @@ def rigid_building(building: Building) -> Building:
     return Building(motions.T @ building.mass @ motions, zeros, zeros, nodes)
 
 
-def check_one_ground(scene: BuildingScene, word: str) -> None:
-    """Raise InputError where bearings have different motions of the ground. word: fidelity with one motion only."""
-    if len(set(scene.grounds[1])) > 1:
-        raise InputError(
-            f"fidelity = {word!r}: it has one motion of the ground, and bearings have motions of their own; give "
-            "another model, such as 'rigid'"
-        )
-
-
-def load_shares(scene: BuildingScene) -> list[float]:
-    """The share of the weight that each bearing carries at rest [-]."""
-    shares: list[float] = (scene.axial_loads / scene.axial_loads.sum()).tolist()
-    return shares
-
-
 def _equivalent(scene: BuildingScene) -> Scene:
     """The scene of the equivalent pendulum of all bearings, which carries the building as a mass."""
-    check_one_ground(scene, "equivalent")
+    if len(set(scene.grounds[1])) > 1:
+        raise InputError(
+            "fidelity = 'equivalent': it has one motion of the ground, and bearings have motions of their own; give "
+            "another model, such as 'rigid'"
+        )
     speed, stacks = peak_speed(scene.first_ground, scene.end), []
     for mount, load in zip(scene.bearings, scene.axial_loads.tolist(), strict=True):
         stacks.append(constant_friction(mount.bearing, mount.law, load, speed))
-    bearing = equivalent_pendulum(stacks, load_shares(scene))
+    bearing = equivalent_pendulum(stacks, (scene.axial_loads / scene.axial_loads.sum()).tolist())
     mass = float(scene.axial_loads.sum()) / scene.gravity
     springs = [
         float(sum(getattr(mount.interface, name) for mount in scene.bearings))

@@ -11,7 +11,6 @@ displacement of the bearing is the sum of these tilts times the differences of e
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, singledispatch
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -105,56 +104,44 @@ def series_links(bearing: Bearing, rims: bool, arms: bool) -> list[Link]:
 
 @dataclass(frozen=True)
 class Backbone:
-    """Force over axial load of a stack that is pushed from its centre, piecewise linear.
+    """Force over axial load of a stack that is pushed from its centre, piecewise linear, with rigid rims.
 
-    links: as of `series_links`. yielding: displacement within which friction is elastic [m]. load: on the stack [N],
-    under which surfaces yield before they slide and rims give way; 0: neither, as published.
+    links: as of `series_links`. yielding: displacement within which friction is elastic [m].
     """
 
     links: tuple[Link, ...]
     yielding: float
-    load: float = 0.0
 
     @classmethod
-    def of(cls, bearing: Bearing, load: float = 0.0) -> Backbone:
+    def of(cls, bearing: Bearing) -> Backbone:
         """The backbone of a bearing, with rims and friction at the radii of its surfaces."""
         links = tuple(series_links(bearing, rims=True, arms=True))
         first = min(link.friction for link in links)
         elastic = [
             link.effective / link.radius * link.yielding for link in links if link.friction <= first * (1 + 1e-9)
         ]
-        return cls(links, sum(elastic), load)
-
-    def softness(self, link: Link) -> float:
-        """By how much a link tilts with the force over load once its slider presses on the rim [rad]."""
-        return self.load / (self.load + link.rim * link.radius)
+        return cls(links, sum(elastic))
 
     def tilts(self, force: float) -> list[float]:
         """Tilt of every link [rad] at a force over load, outermost first."""
         tilts: list[float] = []
         for link in self.links:
             most = link.limit + (0.0 if link.outside is None else tilts[link.outside])
-            free = max(force - link.friction, 0.0)
-            tilts.append(free if free <= most else most + (free - most) * self.softness(link))
+            tilts.append(min(max(force - link.friction, 0.0), most))
         return tilts
 
     def displacement(self, force: float) -> float:
         """Displacement [m] at a force over load."""
-        elastic = sum(
-            link.effective / link.radius * link.yielding * min(force / link.friction, 1.0)
-            for link in self.links
-            if self.load and link.friction > 0
-        )
-        return elastic + sum(link.share * tilt for link, tilt in zip(self.links, self.tilts(force), strict=True))
+        return sum(link.share * tilt for link, tilt in zip(self.links, self.tilts(force), strict=True))
 
     @cached_property
     def points(self) -> tuple[Array, Array]:
-        """Displacements [m] and forces over load at which the slope changes, from the first onset of sliding (under a
-        load: from 0) to the last rim; ndarrays, shape (k,).
+        """Displacements [m] and forces over load at which the slope changes, from the first onset of sliding to the last
+        rim; ndarrays, shape (k,).
         """
-        forces: set[float] = {0.0} if self.load else set()
+        forces: set[float] = set()
         limits: list[float] = []
-        for link in self.links:  # that rims give way moves the corners by next to nothing
+        for link in self.links:
             limits.append(link.limit + (0.0 if link.outside is None else limits[link.outside]))
             forces |= {link.friction, link.friction + limits[-1]}
         rising = np.array(sorted(forces))
@@ -164,33 +151,12 @@ class Backbone:
         moved = np.append(True, np.diff(displacements) > 1e-12)
         return displacements[moved], rising[moved]
 
-    def force(self, displacement: Array) -> Array:
-        """Force over load at displacements [m], of their shape; beyond the last rim it stays where rims are rigid."""
-        beyond = np.maximum(np.asarray(displacement) - self.capacity, 0.0)
-        return np.asarray(np.interp(displacement, *self.points) + beyond * self.last_slope)
-
-    def sliding(self, displacement: float) -> list[float]:
-        """Sliding displacement of every surface [m] at a displacement of the bearing [m], in the order of surfaces."""
-        tilts = self.tilts(float(self.force(np.array(displacement))))
-        out = [0.0] * len(self.links)
-        for link, tilt in zip(self.links, tilts, strict=True):
-            out[link.surface] = link.radius * (tilt - (0.0 if link.outside is None else tilts[link.outside]))
-        return [max(value, 0.0) for value in out]
-
-    @cached_property
-    def last_slope(self) -> float:
-        """Slope where all sliders press on their rims [1/m]; 0 where rims are rigid."""
-        first = 2 * float(self.points[1][-1])
-        compliance = self.displacement(first + 1.0) - self.displacement(first)
-        return 1 / compliance if compliance > 0 else 0.0
-
     @property
     def capacity(self) -> float:
         """Displacement at which the last slider meets its rim [m]."""
         return float(self.points[0][-1])
 
 
-_Scene = TypeVar("_Scene")  # of a bearing or of a building
 AnyEffects = TypeVar("AnyEffects", bound=Effects | Auto)
 EQUAL = 1e-9  # relative difference of slopes that are equal but for rounding
 LOOSE = 1e-2  # relative tolerance of the cheaper models
@@ -231,8 +197,6 @@ def _reduced_scene(scene: Scene, word: str) -> Scene:
     if word not in _REDUCTIONS:
         levels = ", ".join(map(repr, ("exact", *_REDUCTIONS)))
         raise InputError(f"fidelity = {word!r}: one bearing has no such model; give one of {levels}")
-    if word == "backbone":
-        return labelled(scene, word)
     return replace(_REDUCTIONS[word](scene), fidelity=word)
 
 
@@ -243,13 +207,6 @@ def check_stack(scene: Any) -> None:
             "fidelity = 'equivalent': its surfaces are those of one pendulum, not of the stack; give 'massless', or a "
             "study, which changes the stack first"
         )
-
-
-def labelled(scene: _Scene, word: str) -> _Scene:
-    """The scene with another fidelity, which alone says how studies run it; nothing is checked again."""
-    other = copy(scene)
-    object.__setattr__(other, "fidelity", word)
-    return other
 
 
 def _loose(scene: Scene) -> Scene:
@@ -378,5 +335,4 @@ _REDUCTIONS: dict[str, Callable[[Scene], Scene]] = {
     "loose": _loose,
     "massless": _massless,
     "equivalent": _equivalent,
-    "backbone": lambda scene: scene,
 }

@@ -56,7 +56,6 @@ FIDELITIES = {
     "loose": "a loose tolerance",
     "massless": "sliders without inertia, at a loose tolerance",
     "equivalent": "one pendulum with the main regime of the published backbone",
-    "backbone": "in studies: a mass on the published backbone, in fixed steps; peaks only",
     "rigid": "of a building: one rigid body on massless bearings",
 }
 Fidelity = Annotated[str, Choice(FIDELITIES)]

@@ -124,8 +124,6 @@ def integrate(
 
     Arguments, errors: as of `simulate`. with_initial_row: as of `Run.result`. Raises RunError where there is no row.
     """
-    if system.fidelity == "backbone":
-        raise InputError("fidelity = 'backbone': only studies run it, it keeps no history; give 'equivalent'")
     run = start(system, **options)
     if checkpoint is not None and run.without_checkpoint:
         raise InputError(f"checkpoint = {str(checkpoint)!r}: {run.without_checkpoint}; leave out one of them")

@@ -34,7 +34,6 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import System, is_system
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.simulate import integrate
-from msfp_gen.studies.estimation.backbone_run import check_backbone, run_backbone
 
 T = TypeVar("T")
 S = TypeVar("S")
@@ -306,8 +305,8 @@ def completed_runs(
     for label, scene in zip(labels, scenes, strict=True):
         with _located(label):
             check_method(scene)
-            if strict and (scene.fidelity == "backbone" or "strict" not in scene.run_options):
-                raise InputError("strict: only runs of one bearing have it, not of the level 'backbone'; leave it out")
+            if strict and "strict" not in scene.run_options:
+                raise InputError("strict: only runs of one bearing have it; leave it out")
     shared = None if progress is None else SharedProgress(len(scenes), progress)
     threads = max(1, usable_cores() // max(1, min(count, len(scenes))))
 
@@ -327,16 +326,14 @@ def completed_runs(
 
 
 def check_method(scene: System) -> None:
-    """Raise InputError where the method, or the model "backbone", does not run a scene; a building needs no check."""
-    if scene.fidelity == "backbone":
-        check_backbone(scene)
-    elif isinstance(scene, Scene):
+    """Raise InputError where the method does not run a scene; a building needs no check."""
+    if isinstance(scene, Scene):
         check(scene, scene.modelled)
 
 
 def build_models(scenes: Iterable[System]) -> None:
     """Build the compiled models with which scenes start, where the cache of this host lacks them."""
-    for spec in dict.fromkeys(spec for scene in scenes if scene.fidelity != "backbone" for spec in scene.specs):
+    for spec in dict.fromkeys(spec for scene in scenes for spec in scene.specs):
         build_model(spec.layout, spec.effects)
 
 
@@ -353,8 +350,6 @@ def run_to_end(
     InputError as `simulate`; RunError: there are no rows, or the time is over (status "limit"; `.result` has the rows
     until then).
     """
-    if scene.fidelity == "backbone":
-        return run_backbone(scene)
     begin, expired = working_time(), False
 
     def proceed(reached: float, end: float) -> None:

@@ -272,7 +272,7 @@ def test_runtime_includes_one_way(path):
     assert included and included <= below | generated
 
 
-FOLDERS_OF_C = ("runtime", "embedding/assets/fmi", "buildings/compiled", "studies/estimation/compiled")
+FOLDERS_OF_C = ("runtime", "embedding/assets/fmi", "buildings/compiled")
 FUNCTION = re.compile(r"^(?!.*\bstatic\b|MSFP_INLINE|typedef)\w[\w *]*?\b(\w+)\([^;{}]*\)\s*\{", flags=re.MULTILINE)
 
 

@@ -41,7 +41,7 @@ STATISTICS = {
     "mean": "the mean",
     "probability": "the probability that the quantity is at least `threshold`",
 }
-LEVELS = {"backbone": 1, "equivalent": 2, "rigid": 3, "massless": 3, "loose": 3}  # cheaper model -> rank, cheapest 1
+LEVELS = {"equivalent": 1, "rigid": 2, "massless": 2, "loose": 2}  # cheaper model -> rank, cheapest 1
 BOUNDS = {"most": "a lower bound", "least": "an upper bound", "": ""}  # `Quantity.side` -> of a run that ended early
 ENOUGH = 0.25  # work over plain Monte Carlo below which no dearer model is tried
 NO_BENEFIT = 0.8  # work over plain Monte Carlo above which only exact runs are made
@@ -195,7 +195,7 @@ def estimate(
         study, quantity=quantity, statistic=statistic, threshold=threshold, target=target, budget=budget,
         models=None if models is None else tuple(models), pilot=pilot, seed=seed,
     )  # fmt: skip
-    cheaper = ("backbone", "massless" if "peak_sliding_1" in study.keep.known else "rigid")
+    cheaper = ("equivalent", "massless" if "peak_sliding_1" in study.keep.known else "rigid")
     levels = (EXACT, *(cheaper if question.models is None else question.models))
     assert question.quantity is not None
     existed = Path(folder).exists()

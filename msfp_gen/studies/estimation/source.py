@@ -15,20 +15,17 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
-from msfp_gen.specification import formula
 from msfp_gen.studies.assessment.rows import COMPLETE, numbers, read_study
 from msfp_gen.studies.axes import Sampling, SceneFactory, values_at
 from msfp_gen.studies.batch import Pool
-from msfp_gen.studies.columns import Keep
 from msfp_gen.studies.definition import Study
-from msfp_gen.studies.estimation.backbone_run import OF_SURFACES, QUANTITIES, check_backbone
 from msfp_gen.studies.estimation.estimators import EXACT
 from msfp_gen.studies.run import STUDY_FILE, parts_in, readable_parts, run_on, study_table
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 BLOCK = 1024  # draws that are made together
-CHUNKS = {EXACT: 4, "backbone": 64}  # model -> runs of a part
+CHUNKS = {EXACT: 4, "equivalent": 64}  # model -> runs of a part
 CHUNK = 8  # runs of a part of any other model
 MEASURED = 4  # parts from which the cost of a run is computed
 
@@ -203,26 +200,7 @@ def check_quantity(study: Study, quantity: str, levels: Sequence[str]) -> None:
     if quantity not in study.keep.numbers:
         kept = ", ".join(study.keep.numbers)
         raise InputError(f"quantity = {quantity!r}: the study keeps {kept}; give one, or add it to keep")
-    factory = SceneFactory(study.recipe)
+    SceneFactory(study.recipe)
     for level in levels:
-        if level == "backbone":
-            check_backbone(factory.base)
-            known = {*QUANTITIES, *study.keep.axes}
-            known |= {name for name in study.keep.known if name.rpartition("_")[0] in OF_SURFACES}
-            if missing := [name for name in _names_in(study.keep, quantity) if name not in known]:
-                raise InputError(
-                    f"quantity = {quantity!r}: {missing[0]} is none of the model 'backbone'; give another quantity, or "
-                    "accuracy.models = ['massless']"
-                )
-        elif level != EXACT:
+        if level != EXACT:
             SceneFactory(replace(study.recipe, scene={**study.recipe.scene, "fidelity": level}))
-
-
-def _names_in(keep: Keep, quantity: str) -> list[str]:
-    """The quantities in the formula of a quantity; the name itself where it has no formula."""
-    text = dict(keep.formulas).get(quantity)
-    if text is None:
-        return [quantity]
-    if "(" in text and any(f"{word}(" in text for word in ("peak", "least", "most", "last")):
-        return [text]
-    return sorted(formula.names_in(formula.parse(text, [*keep.known, *keep.axes])))

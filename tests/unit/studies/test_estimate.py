@@ -8,13 +8,9 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import norm
 
-from msfp_gen import Effects, InputError, Motion, load_scene
-from msfp_gen.scene.fidelity import Backbone, at_fidelity
-from msfp_gen.scene.file.loader import bearing_from_table
+from msfp_gen import InputError
 from msfp_gen.studies import estimate, read_study
-from msfp_gen.studies.batch import run_to_end
 from msfp_gen.studies.definition import example_text
-from msfp_gen.studies.estimation.backbone_run import parallel
 from msfp_gen.studies.estimation.estimate import Question, estimate_table, estimated, plot_estimate
 from msfp_gen.studies.estimation.estimators import exceeding, mean_of, optimal_runs, work
 
@@ -24,7 +20,7 @@ SPREAD, NOISE = 0.5, 0.1  # standard deviation of the logarithm, and share of it
 class Lognormal:
     """A source of a lognormal quantity with known moments; the cheap model has a bias and another spread."""
 
-    def __init__(self, seed=0, noise=NOISE, cost=0.01, levels=("exact", "backbone"), population=None, fails=0.0):
+    def __init__(self, seed=0, noise=NOISE, cost=0.01, levels=("exact", "equivalent"), population=None, fails=0.0):
         self.levels, self.population = levels, population
         rng = np.random.default_rng([seed, 5])
         count = population or 200_000
@@ -32,11 +28,11 @@ class Lognormal:
         exact = np.exp(SPREAD * (hidden + noise * other))
         self._values = {
             "exact": exact,
-            "backbone": 1.1 * np.exp(0.45 * hidden),
+            "equivalent": 1.1 * np.exp(0.45 * hidden),
             "massless": exact * np.exp(0.01 * rng.standard_normal(count)),
         }
         self._early = rng.random(count) < fails
-        self._costs = {"exact": 1.0, "backbone": cost, "massless": 0.3}
+        self._costs = {"exact": 1.0, "equivalent": cost, "massless": 0.3}
         self._done = dict.fromkeys(levels, 0)
 
     def values(self, level, count):
@@ -147,7 +143,7 @@ class Overshooting(Lognormal):
         exact = np.exp(0.3 * rng.standard_normal(200_000))
         rare = rng.random(len(exact)) < 0.02
         close = exact * np.exp(0.01 * rng.standard_normal(len(exact)))
-        self._values = {"exact": np.where(rare, 5 * exact, exact), "backbone": np.where(rare, 500 * exact, close)}
+        self._values = {"exact": np.where(rare, 5 * exact, exact), "equivalent": np.where(rare, 500 * exact, close)}
 
 
 def test_a_cheap_model_that_is_wrong_at_few_draws_misleads_nobody():
@@ -203,46 +199,6 @@ def test_a_budget_is_kept():
     assert 60 < found.seconds < 130
 
 
-@pytest.mark.parametrize(("name", "factor"), [("prototype-tfp", 1.0), ("fenz-tfp", 1.6), ("quintuple-fp", 2.1229)])
-def test_the_backbone_in_parallel_is_the_backbone(name, factor):
-    """Also where its slope rises before it is least: with this friction a rim is met before the last surface slides."""
-    bearing = bearing_from_table({"preset": name})
-    bearing = bearing.replace(friction=[factor * surface.friction for surface in bearing.surfaces])
-    backbone = Backbone.of(bearing, 112e3)
-    elements, spring, gaps = parallel(backbone)
-    for u in np.linspace(0.0, 1.3 * backbone.capacity, 27):
-        force = spring * u + np.minimum(elements[0] * u, elements[1]).sum()
-        force += (gaps[1] * np.maximum(u - gaps[0], 0)).sum()
-        assert force == pytest.approx(backbone.force(u), rel=1e-9)
-
-
-@pytest.mark.parametrize("rims", [True, False])
-def test_the_backbone_meets_its_rims_as_the_bearing_does(rims):
-    """A pulse that presses all sliders on their rims, which multiplies the shear; without rims they go beyond."""
-    times = np.arange(0.0, 6.0, 0.01)
-    pulse = 2.0 * np.sin(2 * np.pi * times / 2.5) * (times < 2.5)
-    motion = Motion.from_acceleration(times, np.outer(pulse, [1.0, 0.3 * rims, 0.0]))
-    given = load_scene("ridgecrest-clc")
-    effects = replace(given.effects, friction="constant") if rims else Effects(dimension="planar", rims=False)
-    scene = replace(
-        given, motion=motion, motion_table=None, duration=None, bearing=given.bearing.replace(reference_pressure=None),
-        effects=effects, solver=replace(given.solver, rtol=1e-3),
-    )  # fmt: skip
-    exact, cheap = run_to_end(scene).summary, run_to_end(at_fidelity(scene, "backbone")).summary
-    assert max(exact["minimum_gap"][0], cheap["minimum_gap"][0]) < 0
-    assert (exact["peak_force"]["radial"] > 150e3) == rims
-    for name in ("peak_displacement", "peak_force"):
-        assert cheap[name]["radial"] == pytest.approx(exact[name]["radial"], rel=0.1)
-
-
-def test_a_run_of_the_backbone_follows_the_exact_one():
-    scene = load_scene("ridgecrest-clc")
-    scene = replace(scene, duration=20.0, solver=replace(scene.solver, rtol=1e-3))
-    exact, cheap = run_to_end(scene), run_to_end(at_fidelity(scene, "backbone"))
-    for name in ("peak_displacement", "peak_force"):
-        assert cheap.summary[name]["radial"] == pytest.approx(exact.summary[name]["radial"], rel=0.3)
-
-
 def small_study(**changes):
     table = tomllib.loads(example_text())
     table["records"] = {
@@ -259,7 +215,7 @@ def test_an_estimate_of_a_study_is_kept_and_continued(tmp_path):
     first = estimate(table, tmp_path / "out", threads=True, workers=1)
     rows = read_study(tmp_path / "out")
     assert len(rows) == first.runs["exact"] >= 16 and "peak_force" in rows.columns
-    assert (tmp_path / "out" / "backbone" / "study.toml").is_file() and first.correlation["backbone"] > 0.8
+    assert (tmp_path / "out" / "equivalent" / "study.toml").is_file() and first.correlation["equivalent"] > 0.8
     times = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("part-*")}
     again = estimate(table, tmp_path / "out", threads=True, workers=1)
     assert again.value == first.value and again.interval == first.interval
@@ -275,14 +231,11 @@ BAD = {
     "no goal": ({}, "give target, such as '2 %', or budget"),
     "no quantity": ({"target": "2 %"}, "accuracy.quantity is missing"),
     "unknown quantity": ({"quantity": "peak_force_ratio", "target": 0.1}, "the study keeps"),
-    "not of the cheap model": ({"quantity": "normal", "target": 0.1}, "none of the model 'backbone'"),
     "threshold": ({"quantity": "peak_force", "statistic": "probability", "target": 0.1}, "accuracy.threshold"),
     "text": ({"quantity": "peak_force", "target": "two"}, "accuracy.target = 'two'"),
     "statistic": ({"quantity": "peak_force", "statistic": "quantile", "threshold": 0.5, "target": 0.1}, "statistic"),
     "models": ({"quantity": "peak_force", "target": 0.1, "models": ["cheap"]}, "accuracy.models has 'cheap'"),
     "no such model": ({"quantity": "peak_force", "target": 0.1, "models": ["rigid"]}, "one bearing has no such model"),
-    "no cheaper model": ({"quantity": "peak_force", "target": 0.1}, "the model 'backbone' carries a mass"),
-    "rims unseen": ({"quantity": "peak_force", "target": 0.1}, "stop.all_rims: the model 'backbone' does not see"),
     "key": ({"quantity": "peak_force", "goal": 0.1}, "accuracy.goal: no such key"),
 }
 
@@ -290,11 +243,7 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_bad_input_is_one_line_and_writes_nothing(tmp_path, case):
     accuracy, text = BAD[case]
-    table = small_study(accuracy=accuracy, quantities={"normal": "least(normal_force_1)"})
-    if case == "no cheaper model":
-        table["scene"] = {**table["scene"], "top": {"kind": "rig", "axial_load": 112e3, "stiffness": 1e9}}
-    if case == "rims unseen":
-        table["scene"] = {**table["scene"], "stop": {"all_rims": True}}
+    table = small_study(accuracy=accuracy)
     with pytest.raises(InputError, match=text) as error:
         estimate(table, tmp_path / "out", threads=True)
     assert "\n" not in str(error.value) and not (tmp_path / "out").exists()
@@ -334,6 +283,6 @@ def test_the_hospital_is_a_base_scene(tmp_path):
         "sampling": {"samples": 4},
     }
     found = estimate(
-        table, tmp_path / "out", "peak_force", target=0.5, pilot=16, models=["backbone"], threads=True, workers=1
+        table, tmp_path / "out", "peak_force", target=0.5, pilot=16, models=["equivalent"], threads=True, workers=1
     )
-    assert found.interval[0] < found.value < found.interval[1] and found.correlation["backbone"] > 0.8
+    assert found.interval[0] < found.value < found.interval[1] and found.correlation["equivalent"] > 0.8
