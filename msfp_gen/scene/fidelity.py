@@ -136,9 +136,7 @@ class Backbone:
 
     @cached_property
     def points(self) -> tuple[Array, Array]:
-        """Displacements [m] and forces over load at which the slope changes, from the first onset of sliding to the last
-        rim; ndarrays, shape (k,).
-        """
+        """Displacements [m] and forces over load where the slope changes, from first sliding to the last rim, (k,)."""
         forces: set[float] = set()
         limits: list[float] = []
         for link in self.links:
