@@ -8,7 +8,9 @@ from functools import reduce
 from operator import or_
 
 import numpy as np
+from numpy.typing import NDArray
 
+from msfp_gen.common.arrays import Array
 from msfp_gen.common.version import __version__
 from msfp_gen.model.compiled import Run
 from msfp_gen.model.model import Model
@@ -20,12 +22,12 @@ from msfp_gen.scene.effect_switching import JAM_STATUSES
 from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
-from msfp_gen.scene.standing import MARGIN, standing_of
+from msfp_gen.scene.standing import MARGIN, seat_stiffness, standing_of
 from msfp_gen.scene.top import MassTop, RigTop
 from msfp_gen.simulation.rows import Segment
 from msfp_gen.specification.contract import STATUSES
 from msfp_gen.specification.friction_laws import is_plastic
-from msfp_gen.specification.layout import Effects
+from msfp_gen.specification.layout import Auto, Effects
 
 Progress = Callable[[float, float], None]  # called with the time reached and the end of the run [s]
 
@@ -149,6 +151,9 @@ TEXTS = {
     "vibration": "the mass vibrates on its stuck bearing at {rate:.2g} Hz, hardly damped, and the errors of the steps "
     "add up: the force is off by some {value:.1%} RMS of its peak, an order of magnitude; give a smaller "
     "solver.rtol, or run with --error 0.5%",
+    "seats": "the bearing hardly slides: its {slid:.3g} m are the elastic part of friction, {value:.1%} of them the "
+    "compression of contacts, which only a model with uplift tells apart; forces and displacements across the bearing do "
+    "not change",
     "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
     "give a smaller contact_damping",
     "creep": "the displacement that remains may be wrong by {value:.3g} m or more, by which surfaces moved while none "
@@ -172,7 +177,7 @@ def history_notes(scene: Scene, effects: Effects, history: History, steps: int) 
     physics = creep_notes(scene, effects, history)
     physics += peak_notes(scene, effects, history)
     numerics = energy_notes(scene, history) + tolerance_notes(scene, effects, history)
-    numerics += vibration_notes(scene, effects, history, steps)
+    numerics += vibration_notes(scene, effects, history, steps) + seat_notes(scene, effects, history)
     return doubts + numerics + damping_notes(scene, history) + physics
 
 
@@ -242,6 +247,23 @@ def vibration_notes(scene: Scene, effects: Effects, history: History, steps: int
     return (_note("vibration", history.time[row], error / peak, rate=turn / (2 * np.pi)),)
 
 
+def seat_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note where `Auto` left out uplift, and its contacts would take more than `Auto.error` of the sliding.
+
+    A contact takes mu N/k of the elastic part of friction, d_y (Y, Z), which is most of what a stuck bearing slides.
+    """
+    if not isinstance(scene.effects, Auto) or scene.effects.uplift is not None or effects.uplift:
+        return ()
+    friction = np.array([surface.friction for surface in scene.bearing.surfaces])
+    mobilised = np.linalg.norm(history.friction_state, axis=-1).max(axis=0)
+    in_contacts = friction * load_at_rest(scene) * mobilised / seat_stiffness(scene.bearing, scene.top)
+    most, slid = float(in_contacts.max()), float(history.sliding.max())
+    if not most > scene.effects.error * slid > 0:
+        return ()
+    row, surface = np.unravel_index(int(history.sliding.argmax()), history.sliding.shape)
+    return (_note("seats", history.time[row], most / slid, int(surface) + 1, slid=slid),)
+
+
 def peak_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
     """A note where N under a rigid mass exceeds `rigid_mass_limit`."""
     limit = rigid_mass_limit(scene)
@@ -270,11 +292,11 @@ def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note,
     """
     across = np.linalg.norm(history.displacement[:, :2], axis=1)
     off_centre = across > max(CREEP_SHARE * float(across.max()), 1e-12)
-    stuck = intervals(history.time, off_centre & ~sliding_surfaces(history).any(axis=1))
+    yields = np.array([surface.yield_displacement for surface in scene.bearing.surfaces])
+    stuck = intervals(history.time, off_centre & ~_slides(history, yields))
     long = [(start, start + length) for start, length in stuck if length > 1.0]
     if is_plastic(effects.bouc_wen) or sum(end - start for start, end in long) < CREEP_TIME:
         return ()
-    yields = np.array([surface.yield_displacement for surface in scene.bearing.surfaces])
     moved = 0.0
     for first, last in (np.searchsorted(history.time, pair).clip(max=len(history.time) - 1) for pair in long):
         elastic = yields * np.linalg.norm(history.friction_state[last] - history.friction_state[first], axis=-1)
@@ -283,6 +305,20 @@ def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note,
     if moved <= CREEP_SHARE * float(across.max()):
         return ()
     return (_note("creep", long[0][0], moved),)
+
+
+def _slides(history: History, yields: Array) -> NDArray[np.bool_]:
+    """Whether the bearing slides in each row: a surface that slides by less than its d_y at a time only creeps.
+
+    From `MOBILISED` friction grows to 99 % by then, where Coulomb friction would hold.
+    """
+    slides = np.zeros(len(history.time), dtype=bool)
+    for flags, slid, d_y in zip(sliding_surfaces(history).T, history.sliding.T, yields, strict=True):
+        changes = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+        for first, last in changes.reshape(-1, 2):
+            spell = slice(max(first - 1, 0), last + 1)
+            slides[first:last] |= np.ptp(slid[spell]) >= d_y
+    return slides
 
 
 def energy_notes(scene: Scene, history: History) -> tuple[Note, ...]:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import auto_scenes
 import numpy as np
 import pytest
 import seats
@@ -24,6 +25,7 @@ from msfp_gen import (
 )
 from msfp_gen.model.compiled import bodies_and_surfaces, top_values
 from msfp_gen.results.geometry import contact_offsets
+from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.scene.parameters import changed_parameters
 from msfp_gen.scene.scene_fields import InitialState
 
@@ -230,6 +232,23 @@ def test_a_stuck_mass_has_one_stiffness():
     assert 0.1 < np.abs(runs[0].friction_state).max() < 0.9
     forces = [run.top_force[:, 0] for run in runs]
     assert np.abs(forces[1] - forces[0]).max() < 0.02 * np.abs(forces[0]).max()
+
+
+def test_what_the_contacts_take_of_a_stuck_bearing_is_noted():
+    """Of two bearings that hardly slide, by the sliding of runs with uplift; nothing is noted where they slide."""
+    for number in (16, 18):
+        scene = auto_scenes.campaign(21, number)
+        (note,) = simulate(scene).notes
+        without, with_uplift = (
+            simulate(replace(scene, effects=replace(all_effects(scene), uplift=uplift))) for uplift in (False, True)
+        )
+        slid = without.extremes.sliding
+        taken = (slid - with_uplift.extremes.sliding).max() / slid.max()
+        assert note.kind == "seats" and note.value == pytest.approx(taken, rel=0.1) and taken > 0.005
+        assert not without.notes and not with_uplift.notes
+        assert with_uplift.extremes.top_force[3] == pytest.approx(without.extremes.top_force[3], rel=1e-3)
+    slides = replace(scene, motion=Motion.harmonic(0.1, 0.3, cycles=1))
+    assert not [note for note in simulate(slides).notes if note.kind == "seats"]
 
 
 def growth(scene, time):
