@@ -152,8 +152,8 @@ TEXTS = {
     "add up: the force is off by some {value:.1%} RMS of its peak, an order of magnitude; give a smaller "
     "solver.rtol, or run with --error 0.5%",
     "seats": "the bearing hardly slides: its {slid:.3g} m are the elastic part of friction, {value:.1%} of them the "
-    "compression of contacts, which only a model with uplift tells apart; forces and displacements across the bearing do "
-    "not change",
+    "compression of contacts, which only a model with uplift tells apart; forces and displacements across the bearing "
+    "do not change",
     "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
     "give a smaller contact_damping",
     "creep": "the displacement that remains may be wrong by {value:.3g} m or more, by which surfaces moved while none "
