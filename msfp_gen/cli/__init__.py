@@ -14,6 +14,7 @@ from msfp_gen.cli import (
     model_commands,
     record_commands,
     run_commands,
+    sheet_commands,
     study_commands,
 )
 from msfp_gen.cli.console import fail, say, signals_as_interrupts
@@ -33,7 +34,8 @@ app = typer.Typer(
 )
 # This order is the order of the commands in the help text.
 for group in (
-    run_commands, batch_commands, study_commands, figure_commands, assessment_commands, record_commands, model_commands,
+    run_commands, batch_commands, study_commands, figure_commands, assessment_commands, record_commands,
+    sheet_commands, model_commands,
 ):  # fmt: skip
     app.add_typer(group.app)
 

@@ -25,6 +25,7 @@ from msfp_gen.figures.bearing import (
 from msfp_gen.figures.charts import plot_correction, plot_response_spectrum, plot_work_precision
 from msfp_gen.figures.movie import MOVIE_SUFFIXES, animate, check_movie
 from msfp_gen.figures.section import plot_section
+from msfp_gen.figures.sheet import plot_sheet
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.sign import using_sign
 from msfp_gen.scene.scene import Scene
@@ -47,6 +48,7 @@ __all__ = [
     "plot_response_spectrum",
     "plot_result",
     "plot_section",
+    "plot_sheet",
     "plot_sliding",
     "plot_stages",
     "plot_work_precision",

@@ -134,6 +134,21 @@ def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
     return _bearing(schema.validate_part("bearing", table))
 
 
+def load_sheet(source: str | Path) -> tuple[str, Sheet, Bearing]:
+    """Name, data sheet and bearing of a TOML file with `[bearing] sheet`, of a scene or alone. Raises InputError."""
+    path = Path(source)
+    with prefixed(f"{path}: "):
+        if not is_input(path):
+            raise InputError("no such file; give a TOML file with [bearing.sheet]")
+        table = toml_file(path)
+        bearing = table.get("bearing")
+        if not isinstance(bearing, dict) or "sheet" not in bearing:
+            raise InputError("bearing.sheet is missing: give the data sheet of the bearing (docs/sheet.md)")
+        valid = schema.validate_part("bearing", bearing)
+        name = table.get("name")
+        return name if isinstance(name, str) and name else path.stem, Sheet(**valid["sheet"]), _bearing(valid)
+
+
 def complete_bearing(table: Mapping[str, Any]) -> Table:
     """A `[bearing]` table that states every surface and body, in SI units, of one that names a preset or is complete.
 
