@@ -68,7 +68,7 @@ def effective(backbone: Backbone, displacement: float, gravity: float) -> Effect
         raise InputError(
             f"displacement = {displacement:g} [m]: give more than 0, at most the capacity {backbone.capacity:.6g} [m]"
         )
-    force = float(backbone.force(np.array(displacement)))
+    force = float(np.interp(displacement, *backbone.points))
     pairs = zip(backbone.links, backbone.tilts(force), strict=True)
     energy = sum(4 * link.friction * link.share * tilt for link, tilt in pairs)
     period = 2 * pi * sqrt(displacement / (gravity * force))
