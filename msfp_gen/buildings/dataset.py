@@ -20,7 +20,6 @@ from msfp_gen.buildings.storey import FREEDOMS, Columns, Node
 from msfp_gen.common.arrays import Array
 from msfp_gen.motions.motion import Motion
 from msfp_gen.results.dataset import ROWS as ONE_BEARING
-from msfp_gen.results.dataset import dataset_of_bearing
 from msfp_gen.results.files import COUNTER, Storage, attributes_of, motion_in, notes_in, without
 from msfp_gen.results.history import ENERGY_BELOW, LABELS
 from msfp_gen.results.stored_group import Attribute, StoredGroup
@@ -243,14 +242,6 @@ def to_dataset(result: Any) -> xr.Dataset:
     return dataset_of(variables, arrays_of(result), labelled(labels_of(result.scene)), about)
 
 
-def dataset_of_one(result: Any) -> xr.Dataset:
-    """The rows of a `BearingResult`, for other programs, with the names of a run of one bearing."""
-    mount = result.scene.bearings[result.index]
-    parts = {"bearing": bearing_table(mount.bearing), "interface": plain_table(mount.interface)}
-    text = dumps({"axial_load": result.axial_load, **parts})
-    return dataset_of_bearing(result, attributes_of(result, "", text, result.notes, {}) | {"bearing": result.label})
-
-
 def labels_of(scene: BuildingScene) -> Labels:
     """Dimension -> labels, for all dimensions but time."""
     building, bearings = scene.building, scene.bearings
@@ -304,7 +295,7 @@ def edition() -> str:
 def fields_in(root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, Any]:
     """The fields of the `BuildingResult` in a file: scene, rows, extremes, counters and notes.
 
-    As `ResultFiles.fields_in`.
+    As `Storage.fields_in`.
     """
     scene = _scene(root, about)
     sizes = SIZES | {dim: len(labels) for dim, labels in labels_of(scene).items()} | {"time": root.rows("time")}

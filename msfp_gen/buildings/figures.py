@@ -126,7 +126,7 @@ def draw_plan(axes: Axes, result: BuildingResult) -> None:
         axes.plot(*(place + u).T, color=COLOURS[0], linewidth=HAIR)
         axes.plot(*place, marker="s", markersize=3.5, color=INK, linestyle="none")
         if len(bearings) <= LABELLED:
-            name, below = scene.bearings[one.index].name or str(one.index + 1), place - [0.0, factor * peak]
+            name, below = scene.bearings[one.number - 1].name or str(one.number), place - [0.0, factor * peak]
             axes.update_datalim([below])
             axes.annotate(
                 f"{plain(name)}: {MILLI * own:.0f} mm",

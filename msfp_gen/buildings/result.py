@@ -1,11 +1,11 @@
-"""`BuildingResult`, the result of the run of a building, and `BearingResult`, one bearing of it."""
+"""`BuildingResult`: the result of the run of a building; each of its bearings has a `Result` as a bearing alone."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,17 +19,12 @@ from msfp_gen.buildings.spectra import FloorSpectra, Steps, floor_spectra
 from msfp_gen.buildings.summary import BuildingCharacterisation
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
-from msfp_gen.results.files import OF_BUILDING, Storage
-from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Event, Extremes, by_axis
+from msfp_gen.results.files import Storage
+from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Extremes, by_axis
 from msfp_gen.results.note import Note
-from msfp_gen.results.result import AnyResult, Curve, OneBearing, Rows
-from msfp_gen.results.summary import summary_of_bearing, time_row
-from msfp_gen.scene.bearing import Bearing
+from msfp_gen.results.result import AnyResult, Curve, Mounting, Result, Rows
+from msfp_gen.results.summary import ratios_text, time_row
 from msfp_gen.scene.fidelity import Backbone
-from msfp_gen.specification.layout import Effects
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,9 +93,9 @@ class BuildingResult(AnyResult):
     wall_time: float = 0.0
 
     @cached_property
-    def bearings(self) -> tuple[BearingResult, ...]:
+    def bearings(self) -> tuple[Result, ...]:
         """The result of every bearing."""
-        return tuple(BearingResult.of(self, index) for index in range(len(self.scene.bearings)))
+        return tuple(bearing_result(self, index) for index in range(len(self.scene.bearings)))
 
     @cached_property
     def notes(self) -> tuple[Note, ...]:
@@ -231,7 +226,7 @@ class BuildingResult(AnyResult):
         - storeys: for each storey name, height [m], peak_drift [m] and peak_drift_ratio [-] at the stiffness centre,
           peak_corner_drift [m] and peak_corner_drift_ratio [-] at the corners of the rectangle around the bearings,
           peak_shear [N], peak_torsion [N m].
-        - bearings: see `BearingResult.summary`.
+        - bearings: see `summarise` in `results.summary`.
         - energy: largest kinetic and strain energy of the building; at the end input, the work of the ground, damped by
           the building, dissipated by the bearings and interface_dissipated by their interfaces [J]; closure_error of
           the balance of the building [-].
@@ -296,7 +291,7 @@ class BuildingResult(AnyResult):
             ("bearings", f"{len(self.bearings)}, peak displacement {1e3 * displacement['radial']:.4g} mm"),
             ("base shear", f"{1e-6 * force['radial']:.4g} MN ({s['peak_force_ratio']:.3f} of the weight)"),
             *summaries.floor_rows(s),
-            ("N over N at rest", summaries.ratios_text(s)),
+            ("N over N at rest", ratios_text(s)),
             ("rims met", summaries.rims_text(s["bearings"])),
         ]
 
@@ -350,134 +345,66 @@ def _squares(rows: Array, matrix: Array) -> Array:
     return products
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class BearingResult(OneBearing):
-    """The result of one bearing of a building; names and signs are as in the `Result` of one bearing.
+def bearing_result(building: BuildingResult, index: int) -> Result:
+    """The result of a bearing by its index, from 0."""
+    scene, bearing = building.scene, building.scene.bearings[index].bearing
+    base, wrench = building.support[:, index, 0], building.wrench[:, index, 1]
+    across = base - building.displacement @ scene.attachments[index, :3].T  # both start at zero
+    own = (slice(None), index, slice(bearing.layout.surfaces))
+    rows = {name: getattr(building, name)[own] for name in (*OF_SURFACES, "normal_force")}
+    rows["temperature"] = heated(bearing, rows["temperature"])
+    history = BearingRows(
+        time=building.time,
+        base_displacement=base,
+        displacement=across,
+        top_force=-wrench[:, :3],
+        top_moment=-wrench[:, 3:],
+        gap=bearing.arrays()["capacity"] - rows["sliding"],
+        energy={name: getattr(building, name)[:, index] for name in ENERGY_BELOW},
+        **rows,
+    )
+    own_notes = (note for note in building.monitored if note.bearing == index + 1)
+    return Result(
+        scene=cast("Any", scene),
+        history=cast("Any", history),
+        status=building.status,
+        message=building.message,
+        provenance=building.provenance,
+        notes=tuple(sorted(own_notes, key=lambda note: note.time)),
+        recorded_extremes=_extremes(building, index),
+        mounting=_mounting(building, index),
+    )
 
-    building: the result of the building. index: of the bearing, from 0. history: rows of the bearing; base_displacement
-    is of the ground below it, displacement is across bearing and interface, top_moment is about its upper end. scene,
-    status, message, provenance: of `building`. bearing: values. effects: of the model at the start. axial_load:
-    compression at rest [N]. events: none, since the run of a building does not record events.
-    """
 
-    source: ClassVar[str] = OF_BUILDING
-    building: BuildingResult
-    index: int
-    history: BearingRows
-    scene: BuildingScene
-    status: str
-    message: str
-    provenance: dict[str, str]
-    bearing: Bearing
-    effects: Effects
-    axial_load: float
-    events: tuple[Event, ...] = ()
+def _extremes(building: BuildingResult, index: int) -> Extremes:
+    """Extremes of a bearing over all steps."""
+    peaks, bearing = building.extremes, building.scene.bearings[index].bearing
+    own = (index, slice(bearing.layout.surfaces))
+    least, most = peaks.normal_force[index, :, own[1]]
+    rows = {name: getattr(peaks, name)[own] for name in (*OF_SURFACES, *CONTACT)}
+    return Extremes(
+        displacement=peaks.bearing_displacement[index],
+        top_force=peaks.top_force[index],
+        gap=bearing.arrays()["capacity"] - peaks.sliding[own],
+        least_normal=least,
+        most_normal=most,
+        **rows | {"temperature": heated(bearing, rows["temperature"])},
+    )
 
-    @classmethod
-    def of(cls, building: BuildingResult, index: int) -> BearingResult:
-        """The result of a bearing by its index, from 0."""
-        scene, bearing = building.scene, building.scene.bearings[index].bearing
-        base, wrench = building.support[:, index, 0], building.wrench[:, index, 1]
-        across = base - building.displacement @ scene.attachments[index, :3].T  # both start at zero
-        own = (slice(None), index, slice(bearing.layout.surfaces))
-        rows = {name: getattr(building, name)[own] for name in (*OF_SURFACES, "normal_force")}
-        rows["temperature"] = heated(bearing, rows["temperature"])
-        history = BearingRows(
-            time=building.time,
-            base_displacement=base,
-            displacement=across,
-            top_force=-wrench[:, :3],
-            top_moment=-wrench[:, 3:],
-            gap=bearing.arrays()["capacity"] - rows["sliding"],
-            energy={name: getattr(building, name)[:, index] for name in ENERGY_BELOW},
-            **rows,
-        )
-        of_building = (scene, building.status, building.message, building.provenance)
-        return cls(
-            building, index, history, *of_building, bearing, scene.modelled[index], float(scene.axial_loads[index])
-        )
 
-    @property
-    def number(self) -> int:
-        """Number of the bearing, from 1."""
-        return self.index + 1
-
-    @property
-    def label(self) -> str:
-        """Number and name of the bearing, for messages."""
-        return self.scene.label(self.index)
-
-    @property
-    def title(self) -> str:
-        """The label, and the name of the building."""
-        return f"{self.label} of {self.building.title}"
-
-    @property
-    def notes(self) -> tuple[Note, ...]:
-        """The notes of the monitors of this bearing, in order of time."""
-        own = (note for note in self.building.monitored if note.bearing == self.number)
-        return tuple(sorted(own, key=lambda note: note.time))
-
-    @property
-    def model_changes(self) -> tuple[Note, ...]:
-        """The notes after which the run continued with another model of this bearing; `action` states its effects."""
-        return tuple(note for note in self.notes if note.action)
-
-    @cached_property
-    def extremes(self) -> Extremes:
-        """Extremes over all steps."""
-        peaks, index = self.building.extremes, self.index
-        own = (index, slice(self.bearing.layout.surfaces))
-        least, most = peaks.normal_force[index, :, own[1]]
-        rows = {name: getattr(peaks, name)[own] for name in (*OF_SURFACES, *CONTACT)}
-        return Extremes(
-            displacement=peaks.bearing_displacement[index],
-            top_force=peaks.top_force[index],
-            gap=self.bearing.arrays()["capacity"] - peaks.sliding[own],
-            least_normal=least,
-            most_normal=most,
-            **rows | {"temperature": heated(self.bearing, rows["temperature"])},
-        )
-
-    @cached_property
-    def summary(self) -> dict[str, Any]:
-        """Main results as plain data, SI units; peaks are over all steps, lists are for the surfaces, bottom first.
-
-        Keys of any bearing: see `Result.summary`; axial_load is at rest [N]. Other keys: number (from 1), name, layout,
-        position in plan [m]; minimum_load_ratio and maximum_load_ratio: axial force over the load at rest, 0 where the
-        bearing lifts [-]; displacement_used: peak displacement over that at which all rims are met [-];
-        dissipated, and by its interface interface_dissipated: at the end [J].
-        """
-        least, most = self.building.extremes.axial_force[self.index] / self.axial_load
-        return {
-            "number": self.number,
-            "name": self.scene.bearings[self.index].name,
-            "layout": self.bearing.layout.name,
-            "position": self.scene.places[self.index].tolist(),
-            **summary_of_bearing(self),
-            "displacement_used": float(self.extremes.displacement[3]) / Backbone.of(self.bearing).capacity,
-            "minimum_load_ratio": max(float(least), 0.0),  # below 0 its top plate hangs from the building
-            "maximum_load_ratio": float(most),
-            "verdict": self.verdict.as_dict,
-            **{name: float(self.history.energy[name][-1]) for name in ("dissipated", "interface_dissipated")},
-        }
-
-    def main_results(self) -> Rows:
-        """Label and value of the main results."""
-        s = self.summary
-        x, y = s["position"]
-        return [
-            ("bearing", f"{s['layout']} at ({x:g}, {y:g}) m"),
-            *super().main_results(),
-            ("N over N at rest", summaries.ratios_text(s)),
-        ]
-
-    @property
-    def groups(self) -> dict[str, xr.Dataset]:
-        """None: the file of one bearing has the dataset alone, for other programs."""
-        return {}
-
-    @cached_property
-    def dataset(self) -> xr.Dataset:
-        """The rows of the bearing as an xarray.Dataset; variables, units and meanings as of `Result.dataset`."""
-        return building_dataset.dataset_of_one(self)
+def _mounting(building: BuildingResult, index: int) -> Mounting:
+    scene, mount, peaks = building.scene, building.scene.bearings[index], building.extremes
+    load, displacement = float(scene.axial_loads[index]), float(peaks.bearing_displacement[index, 3])
+    least, most = peaks.axial_force[index] / load
+    summary = {
+        "number": index + 1,
+        "name": mount.name,
+        "layout": mount.bearing.layout.name,
+        "position": scene.places[index].tolist(),
+        "displacement_used": displacement / Backbone.of(mount.bearing).capacity,
+        "minimum_load_ratio": max(float(least), 0.0),  # below 0 its top plate hangs from the building
+        "maximum_load_ratio": float(most),
+        **{name: float(getattr(building, name)[-1, index]) for name in ("dissipated", "interface_dissipated")},
+    }
+    effects = scene.modelled[index]
+    return Mounting(index + 1, scene.label(index), mount.bearing, effects, load, mount.interface, summary)

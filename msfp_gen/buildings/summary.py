@@ -12,7 +12,7 @@ from msfp_gen.common.tables import Table, yes
 from msfp_gen.results.characterise import Characterisation, characterised, effective_period
 from msfp_gen.results.history import by_axis
 from msfp_gen.results.loops import ForcePath, rests
-from msfp_gen.results.summary import summary_of_run
+from msfp_gen.results.summary import ratios_text, summary_of_run
 
 Columns = dict[str, tuple[str, str, float, str]]
 
@@ -207,12 +207,6 @@ def left_text(gaps: Sequence[float]) -> str:
     """The least gap [mm] and its surface, counted from 1. gaps: of the surfaces, bottom first [m]."""
     surface = int(np.argmin(gaps))
     return f"{1e3 * gaps[surface]:.1f} of {surface + 1}"
-
-
-def ratios_text(summary: Mapping[str, Any], to: str = " to ") -> str:
-    """Least and largest axial force over the load at rest; 0 where the bearing lifts."""
-    least, most = summary["minimum_load_ratio"], summary["maximum_load_ratio"]
-    return f"{least:.2f}{' (lifts)' if least == 0 else ''}{to}{most:.2f}"
 
 
 def _uplift(bearings: Sequence[Mapping[str, Any]]) -> Table:

@@ -229,9 +229,9 @@ def load_source(source: str) -> AnyResult | System:
 
 def is_result(loaded: object) -> bool:
     """Whether this is a result, not a scene."""
-    from msfp_gen.results.files import ResultFiles
+    from msfp_gen.results.result import AnyResult
 
-    return isinstance(loaded, ResultFiles)
+    return isinstance(loaded, AnyResult)
 
 
 def one_bearing(loaded: Any, what: str) -> Any:

@@ -26,7 +26,7 @@ from msfp_gen.figures.charts import plot_correction, plot_response_spectrum, plo
 from msfp_gen.figures.movie import MOVIE_SUFFIXES, animate, check_movie
 from msfp_gen.figures.section import plot_section
 from msfp_gen.figures.sheet import plot_sheet
-from msfp_gen.results.run_data import RunData
+from msfp_gen.results.result import Result
 from msfp_gen.results.sign import using_sign
 from msfp_gen.scene.scene import Scene
 
@@ -56,12 +56,14 @@ __all__ = [
     "with_smooth_rows",
 ]
 
-# Figures of one run, by their names on the command line.
-FIGURES: dict[str, Callable[[RunData, str | Path | None], Figure]] = {
+# Figures of one run, by their names on the command line: of the rows that any bearing has, and of one alone.
+FIGURES_BELOW: dict[str, Callable[[Result, str | Path | None], Figure]] = {
     "overview": plot_result,
     "loops": plot_loops,
     "orbit": plot_orbit,
     "sliding": plot_sliding,
+}
+FIGURES = FIGURES_BELOW | {
     "stages": plot_stages,
     "force-path": plot_force_path,
     "energy": plot_energy,
@@ -77,9 +79,13 @@ def figures_of(loaded: Any) -> Mapping[str, Callable[[Any, str | Path | None], F
     return figures
 
 
-@figures_of.register(RunData)
+@figures_of.register(Result)
+def _figures_of_result(result: Result) -> Mapping[str, Callable[[Any, str | Path | None], Figure]]:
+    return FIGURES if result.mounting is None else FIGURES_BELOW
+
+
 @figures_of.register(Scene)
-def _figures_of_bearing(_: RunData | Scene) -> Mapping[str, Callable[[Any, str | Path | None], Figure]]:
+def _figures_of_scene(_: Scene) -> Mapping[str, Callable[[Any, str | Path | None], Figure]]:
     return FIGURES
 
 

@@ -38,7 +38,7 @@ from msfp_gen.figures.style import (
 )
 from msfp_gen.results.geometry import contact_offsets, friction_circles, sections, slider_radius
 from msfp_gen.results.joining import at_times
-from msfp_gen.results.run_data import BearingData, RunData
+from msfp_gen.results.result import Result
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.results.sliding import intervals, rims_in_contact, sliding_surfaces
 from msfp_gen.results.summary import SYMBOLS, is_monotonic, transitions
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 SIDE = 0.02  # least displacement along a horizontal axis that is drawn, over the largest
 
 
-def plot_loops(result: BearingData, path: str | Path | None = None) -> Figure:
+def plot_loops(result: Result, path: str | Path | None = None) -> Figure:
     """Loops of the top force [kN] over the displacement across the bearing [mm], along each horizontal axis that moves.
 
     The right axis gives force over axial load; the first contact of every rim is marked. result: also one bearing of a
@@ -65,7 +65,7 @@ def plot_loops(result: BearingData, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def plot_orbit(result: BearingData, path: str | Path | None = None) -> Figure:
+def plot_orbit(result: Result, path: str | Path | None = None) -> Figure:
     """Orbits in the horizontal plane: displacement across the bearing [mm], and force on the top support [kN]."""
     with page(10.4, 5.2, path) as figure:
         headline(figure, label_of(result))
@@ -84,7 +84,7 @@ def plot_orbit(result: BearingData, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def moving_axes(result: BearingData) -> tuple[int, ...]:
+def moving_axes(result: Result) -> tuple[int, ...]:
     """Horizontal axes (0: E1, 1: E2) along which the bearing moves; E1 if it does not move."""
     return axes_along(result.history.displacement)
 
@@ -95,7 +95,7 @@ def axes_along(displacement: Array) -> tuple[int, ...]:
     return tuple(np.flatnonzero(peaks > SIDE * peaks.max()).tolist()) or (0,)
 
 
-def draw_loop(axes: Axes, result: BearingData, axis: int) -> None:
+def draw_loop(axes: Axes, result: Result, axis: int) -> None:
     """Top force over displacement along `axis`, with the first rim contacts and force over axial load on the right."""
     history, name = result.history, subscript(axis + 1)
     scale = engineering(history.top_force[:, :2], "N")
@@ -121,7 +121,7 @@ def draw_loop(axes: Axes, result: BearingData, axis: int) -> None:
         ratio.spines["right"].set_visible(True)
 
 
-def draw_orbit(axes: Axes, result: BearingData, title: str = "Orbit") -> None:
+def draw_orbit(axes: Axes, result: Result, title: str = "Orbit") -> None:
     """Displacement across the bearing in the horizontal plane, with its start and the first contact of every rim."""
     u = displacement(result.history.displacement)
     axes.plot(u[:, 0], u[:, 1], color=COLOURS[0])
@@ -137,7 +137,7 @@ def draw_orbit(axes: Axes, result: BearingData, title: str = "Orbit") -> None:
     axes.margins(0.06)
 
 
-def _draw_transitions(axes: Axes, result: BearingData, axis: int) -> None:
+def _draw_transitions(axes: Axes, result: Result, axis: int) -> None:
     """Dotted lines at the transitions of a monotonic run, each with its symbol and value."""
     history = result.history
     sign = float(np.sign(displacement(history.displacement[history.peak_row, axis])))
@@ -164,7 +164,7 @@ def _draw_transitions(axes: Axes, result: BearingData, axis: int) -> None:
 BAR, EDGE = 0.56, 0.16  # heights of the bars for sliding and for rim contact, in rows
 
 
-def plot_sliding(result: BearingData, path: str | Path | None = None) -> Figure:
+def plot_sliding(result: Result, path: str | Path | None = None) -> Figure:
     """Sliding displacement of every surface [mm] over time, with its capacity and the rim contacts."""
     with page(9.5, max(4.8, 1.2 * result.history.surfaces + 1), path) as figure:
         headline(figure, label_of(result))
@@ -172,7 +172,7 @@ def plot_sliding(result: BearingData, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def plot_stages(result: RunData, path: str | Path | None = None) -> Figure:
+def plot_stages(result: Result, path: str | Path | None = None) -> Figure:
     """Sliding regimes over time: when each surface slides or touches its rim, below the displacement of the bearing.
 
     `results.sliding` defines when a surface slides.
@@ -186,7 +186,7 @@ def plot_stages(result: RunData, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def draw_bars(axes: Axes, result: RunData) -> None:
+def draw_bars(axes: Axes, result: Result) -> None:
     """One row per surface, top surface uppermost: a bar while it slides, a black edge during rim contact, a white bar
     while it is separated. The share of time in which it slides stands to the right.
     """
@@ -217,7 +217,7 @@ def draw_bars(axes: Axes, result: RunData) -> None:
     axes.set_title("Sliding surfaces" + (f"  ({', '.join(notes)})" if notes else ""))
 
 
-def draw_sliding(figure: Any, result: BearingData) -> None:
+def draw_sliding(figure: Any, result: Result) -> None:
     """One panel per surface, top surface uppermost: sliding displacement, capacity and rim contacts."""
     history, surfaces = result.history, result.bearing.surfaces
     column = strips(figure, len(surfaces))
@@ -237,7 +237,7 @@ def draw_sliding(figure: Any, result: BearingData) -> None:
     figure.align_ylabels(column)
 
 
-def _draw_displacement(axes: Axes, result: BearingData) -> None:
+def _draw_displacement(axes: Axes, result: Result) -> None:
 
     history = result.history
     for axis, style in zip(moving_axes(result), ("-", "--"), strict=False):
@@ -269,7 +269,7 @@ TERMS = {
 VISIBLE = 1e-3  # least peak of a term that is drawn, over the largest input
 
 
-def plot_energy(result: RunData, path: str | Path | None = None) -> Figure:
+def plot_energy(result: Result, path: str | Path | None = None) -> Figure:
     """Energy balance: dissipated and stored energy stacked over time with the input, and the numerical term below.
 
     Terms below 0.1 % of the largest input are left out.
@@ -288,7 +288,7 @@ def plot_energy(result: RunData, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def _draw_balance(axes: Axes, result: RunData, peak: float) -> None:
+def _draw_balance(axes: Axes, result: Result, peak: float) -> None:
     """Stack the terms over time: positive values above zero, negative ones below."""
     history = result.history
     scale = engineering(peak, "J")
@@ -321,7 +321,7 @@ def _band(axes: Axes, time: Array, start: Array, values: Array, factor: float, c
     return end
 
 
-def plot_force_path(result: RunData, path: str | Path | None = None, *, time: float | None = None) -> Figure:
+def plot_force_path(result: Result, path: str | Path | None = None, *, time: float | None = None) -> Figure:
     """Lines of force with the friction circles at one instant, and the eccentricity of every contact over time [mm].
 
     A slider would tip where its contact lies beyond the edge of its face, which only models with `effects.uplift`
@@ -347,13 +347,13 @@ def plot_force_path(result: RunData, path: str | Path | None = None, *, time: fl
     return figure
 
 
-def eccentricity(result: RunData) -> Array:
+def eccentricity(result: Result) -> Array:
     """Distance of every contact from the axis of its slider [m], shape (T, n-1); NaN while the surface is separated."""
     history = result.history
     return np.where(history.separated, np.nan, contact_offsets(result.scene.bearing, history))
 
 
-def _draw_offsets(figure: SubFigure, result: RunData) -> None:
+def _draw_offsets(figure: SubFigure, result: Result) -> None:
     """One panel per surface, top surface uppermost, with the radius of the slider's face."""
     bearing, off = result.scene.bearing, eccentricity(result) * MILLI
     column = strips(figure, bearing.layout.surfaces)
@@ -370,7 +370,7 @@ def _draw_offsets(figure: SubFigure, result: RunData) -> None:
     figure.align_ylabels(column)
 
 
-def plot_result(result: BearingData, path: str | Path | None = None) -> Figure:
+def plot_result(result: Result, path: str | Path | None = None) -> Figure:
     """Overview of a run: loops along each axis that moves, orbit where both move, sliding of every surface over time.
 
     The right axis of the loops gives force over axial load; sliding is drawn with its capacity and the rim contacts.
@@ -399,7 +399,7 @@ def plot_result(result: BearingData, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def _title(result: BearingData) -> str:
+def _title(result: Result) -> str:
     """Name and peaks over all steps; of a failed run also the time it reached."""
     load = result.axial_load
     displacement, force = result.extremes.displacement[3], result.extremes.top_force[3]

@@ -38,7 +38,7 @@ from msfp_gen.figures.style import (
 from msfp_gen.motions.checks import positive
 from msfp_gen.results.geometry import Section, sections
 from msfp_gen.results.joining import at_times, checked_times
-from msfp_gen.results.run_data import RunData
+from msfp_gen.results.result import Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,8 +118,8 @@ def film_of(result: Any, times: Array, azimuth: float | None) -> Film:
     return film
 
 
-@film_of.register(RunData)
-def stack_film(result: RunData, times: Array, azimuth: float | None) -> Film:
+@film_of.register(Result)
+def stack_film(result: Result, times: Array, azimuth: float | None) -> Film:
     """The movie of one bearing at these times [s], its section at `azimuth` [rad]."""
     frames = at_times(result, times)
     drawn_sections = sections(frames, azimuth)
@@ -128,7 +128,7 @@ def stack_film(result: RunData, times: Array, azimuth: float | None) -> Film:
     return Film(tall, len(times), lambda figure: _layout(figure, result, frames, drawn_sections))
 
 
-def _layout(figure: Figure, result: RunData, frames: RunData, drawn_sections: list[Section]) -> Layout:
+def _layout(figure: Figure, result: Result, frames: Result, drawn_sections: list[Section]) -> Layout:
     """Draw all parts; returns a function that moves them to one row of `frames`, and the artists that it changes."""
     headline(figure, label_of(result))
     height = figure.get_size_inches()[1]
@@ -156,7 +156,7 @@ def _layout(figure: Figure, result: RunData, frames: RunData, drawn_sections: li
     return update, [*drawing.artists, legend, dot, cursor]
 
 
-def _loop(axes: Axes, result: RunData, frames: RunData) -> tuple[Any, Any, Any]:
+def _loop(axes: Axes, result: Result, frames: Result) -> tuple[Any, Any, Any]:
     """Draw the loop, or the orbit where both axes move; returns a marker and its coordinates in every frame."""
     moving = moving_axes(result)
     if len(moving) > 1:

@@ -27,7 +27,7 @@ from msfp_gen.figures.style import (
 from msfp_gen.results.geometry import Section, sections
 from msfp_gen.results.geometry import friction_circles as circle_radii
 from msfp_gen.results.joining import at_times
-from msfp_gen.results.run_data import RunData
+from msfp_gen.results.result import Result
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.results.sliding import rims_in_contact, sliding_surfaces
 
@@ -48,7 +48,7 @@ STATES = {  # (slides, rim contact) -> text
 
 
 def plot_section(
-    result: RunData,
+    result: Result,
     path: str | Path | None = None,
     *,
     time: float | None = None,
@@ -85,7 +85,7 @@ def plot_section(
     return figure
 
 
-def peak_time(result: RunData) -> float:
+def peak_time(result: Result) -> float:
     """Time of the largest horizontal displacement [s]."""
     return float(result.history.time[result.history.peak_row])
 
@@ -98,7 +98,7 @@ class SectionDrawing:
         title: title of the axes, with time and displacement.
     """
 
-    def __init__(self, axes: Axes, then: RunData, section: Section, row: int = 0) -> None:
+    def __init__(self, axes: Axes, then: Result, section: Section, row: int = 0) -> None:
         history, last = then.history, len(section.bodies) - 1
         self.history = history
         self.slides, self.on_rim = sliding_surfaces(history), rims_in_contact(history)

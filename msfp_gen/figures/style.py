@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output, replacing
 from msfp_gen.results.history import Event
-from msfp_gen.results.run_data import BearingData
+from msfp_gen.results.result import Result
 from msfp_gen.results.sign import shown_sign
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def colour(surface: int) -> str:
     return COLOURS[(surface - 1) % len(COLOURS)]
 
 
-def label_of(result: BearingData) -> str:
+def label_of(result: Result) -> str:
     """The name of a run for a title; of a failed run with its status and the time it reached."""
     name = result.title
     if result.succeeded:
@@ -160,12 +160,12 @@ def label_of(result: BearingData) -> str:
     return f"{name}, run failed ({result.status}) at t = {result.history.time[-1]:.4g} s"
 
 
-def contacts(result: BearingData) -> list[Event]:
+def contacts(result: Result) -> list[Event]:
     """All events of rim contact."""
     return [event for event in result.events if event.kind == "rim_contact"]
 
 
-def first_contacts(result: BearingData) -> list[Event]:
+def first_contacts(result: Result) -> list[Event]:
     """The first contact of every rim; markers of all contacts would cover the loop."""
     return list({event.surface: event for event in reversed(contacts(result))}.values())[::-1]
 

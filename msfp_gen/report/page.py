@@ -22,7 +22,6 @@ from msfp_gen.results.files import COUNTER, PROVENANCE, without
 from msfp_gen.results.history import Event
 from msfp_gen.results.note import by_importance
 from msfp_gen.results.result import AnyResult, Result
-from msfp_gen.results.run_data import BearingData
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.explain import explain
 from msfp_gen.studies.calibration import Fit, FittedTest
@@ -86,7 +85,7 @@ def summary_page(result: AnyResult) -> list[Table]:
     """Tables of the run as in `msfp-gen run`, without times of the machine, and of the events of one bearing."""
     first, *others = result.tables()
     rows = [("time simulated", f"{result.summary['duration']:.6g} s"), *(row for row in first.rows if row[0] != "time")]
-    events = result.events if isinstance(result, BearingData) else ()
+    events = result.events if isinstance(result, Result) else ()
     return [Table("the run", (), rows), *others, *([_event_table(events)] if events else [])]
 
 

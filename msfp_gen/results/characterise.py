@@ -7,16 +7,19 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from math import atan2, degrees, pi, sqrt
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_rows
+from msfp_gen.results.history import History
 from msfp_gen.results.loops import Branch, ForcePath, Loop, SurfaceDemand, branch_of, signed_slip, surface_demands
-from msfp_gen.results.run_data import BearingData, RunData
 from msfp_gen.results.summary import is_monotonic, transitions
+
+if TYPE_CHECKING:
+    from msfp_gen.results.result import Result
 
 Kind = Literal["cycles", "monotonic", "one direction", "two directions"]
 CSV_SUFFIXES = (".csv",)
@@ -326,7 +329,7 @@ NO_STACK = "one pendulum is in place of the stack: no sliding regimes and no dem
 NO_LOOP = "effective stiffness, damping, zero-displacement force and the sliding regimes of a cycle are not defined"
 
 
-def characterise(one: BearingData) -> Characterisation:
+def characterise(one: Result) -> Characterisation:
     """Characterise a run of one bearing; docs/characterise.md gives the formulas and the clauses of codes.
 
     What the rows of a bearing below a building do not have is None, and the notes say so; its period is that with N at
@@ -334,7 +337,7 @@ def characterise(one: BearingData) -> Characterisation:
     """
     history, load, peaks = one.history, one.axial_load, one.extremes
     path = ForcePath.of(history.time, history.displacement, history.top_force)
-    branch = _branches(one, path) if isinstance(one, RunData) and not one.one_pendulum else None
+    branch = _branches(one, path) if isinstance(one.history, History) and not one.one_pendulum else None
     name = one.title if one.number else one.scene.name
     largest = (float(peaks.displacement[3]), float(peaks.top_force[3]))
     common = name, one.status, path, largest, load, one.bearing.gravity, history.dissipated
@@ -359,7 +362,7 @@ def characterise(one: BearingData) -> Characterisation:
     )
 
 
-def _branches(result: RunData, path: ForcePath) -> Callable[[int, int], Branch]:
+def _branches(result: Result, path: ForcePath) -> Callable[[int, int], Branch]:
     """A function that gives the sliding regimes between two rows."""
     (u, force), (slip, plastic) = path.along, signed_slip(result, path.direction)
 

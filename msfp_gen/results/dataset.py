@@ -11,7 +11,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.common.errors import InputError
-from msfp_gen.results.files import COUNTER, REMEDY, WORDS, Storage, attributes_of, motion_in, notes_in, without
+from msfp_gen.results.files import (
+    COUNTER,
+    OF_BUILDING,
+    REMEDY,
+    WORDS,
+    Storage,
+    attributes_of,
+    motion_in,
+    notes_in,
+    without,
+)
+from msfp_gen.results.gradients import ERROR, EVENTS, Gradients, energy_terms
 from msfp_gen.results.history import (
     ENERGY,
     ENERGY_BELOW,
@@ -25,7 +36,6 @@ from msfp_gen.results.history import (
     History,
     quantities,
 )
-from msfp_gen.results.run_data import ERROR, EVENTS, BearingData, Gradients, RunData, energy_terms
 from msfp_gen.results.stored_group import Attribute, StoredGroup
 from msfp_gen.results.variables import (
     Arrays,
@@ -44,6 +54,8 @@ from msfp_gen.specification.contract import EVENT_KINDS, names
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from msfp_gen.results.result import Mounting, Result
 
 
 def _rows() -> Iterator[tuple[str, Variable]]:
@@ -74,17 +86,13 @@ BELOW = {  # of a bearing of a building
 }
 
 
-def to_dataset(result: RunData) -> xr.Dataset:
+def to_dataset(result: Result) -> xr.Dataset:
     """The rows of `result` along `time`, its events along `event`; scene, status and provenance in the attributes."""
-    return dataset_of_bearing(result, _attributes(result))
+    about = _attributes(result) if result.mounting is None else _attributes_below(result, result.mounting)
+    return dataset_of(VARIABLES | BELOW, arrays_of(result), labelled(labels_of(result.history.surfaces)), about)
 
 
-def dataset_of_bearing(one: BearingData, attributes: dict[str, Attribute]) -> xr.Dataset:
-    """Rows and events of any bearing."""
-    return dataset_of(VARIABLES | BELOW, arrays_of(one), labelled(labels_of(one.history.surfaces)), attributes)
-
-
-def arrays_of(result: BearingData) -> Arrays:
+def arrays_of(result: Result) -> Arrays:
     """The arrays of a result by field; each variable is one of them or a part of one."""
     return rows_of(result.history) | {
         name: np.array([getattr(event, name.removeprefix("event_")) for event in result.events], variable.kind).reshape(
@@ -122,7 +130,7 @@ def _columns_of_scene(scene: Scene) -> Places:
     return _columns(scene.bearing.layout.surfaces)
 
 
-def _attributes(result: RunData) -> dict[str, str | int | float]:
+def _attributes(result: Result) -> dict[str, str | int | float]:
     from msfp_gen.scene.file.stored_motion import PIECES, RECIPE, needs_pieces, scene_attribute
 
     scene, counters = scene_attribute(result.scene), asdict(result.counters)
@@ -133,13 +141,22 @@ def _attributes(result: RunData) -> dict[str, str | int | float]:
     }
 
 
+def _attributes_below(one: Result, mounting: Mounting) -> dict[str, str | int | float]:
+    """Those of a bearing of a building, for other programs: its file is not read again."""
+    from msfp_gen.scene.file.loader import bearing_table, dumps, plain_table
+
+    parts = {"bearing": bearing_table(mounting.bearing), "interface": plain_table(mounting.interface)}
+    text = dumps({"axial_load": mounting.axial_load, **parts})
+    return attributes_of(one, "", text, one.notes, {}) | {"source": OF_BUILDING, "bearing": mounting.label}
+
+
 def edition() -> str:
     """A digest of the names that a file of this version has: of variables, counters and labels."""
     return digest_of_names([*VARIABLES, *LABELS.items(), [field.name for field in fields(Counters)], WORDS])
 
 
 def fields_in(root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, Any]:
-    """Scene, rows, events, counters, notes, extremes and derivatives, as `ResultFiles.fields_in`."""
+    """Scene, rows, events, counters, notes, extremes and derivatives, as `Storage.fields_in`."""
     scene = _scene(root, about)
     surfaces = scene.bearing.layout.surfaces
     sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}
@@ -234,14 +251,14 @@ PARAMETER = "parameter"
 GRADIENT = "gradient"  # group of the file
 
 
-def gradients_of(result: RunData) -> Gradients:
+def gradients_of(result: Result) -> Gradients:
     """The derivatives of a run. Raises InputError where none were asked for."""
     if result.gradients is None:
         raise InputError("gradient: this run computed none; call simulate(scene, gradients=[path, ...])")
     return result.gradients
 
 
-def to_gradient_dataset(result: RunData) -> xr.Dataset:
+def to_gradient_dataset(result: Result) -> xr.Dataset:
     """Derivatives of the variables of the dataset of a run, under their names, with the first dimension `parameter`.
 
     Where the errors of the derivatives were measured, each has a variable `..._error` beside it.
@@ -275,7 +292,7 @@ def _derivative(variable: Variable) -> Variable:
     )
 
 
-def gradient_group(result: RunData) -> xr.Dataset:
+def gradient_group(result: Result) -> xr.Dataset:
     """The derivatives of a run, with its parameters and the derivatives of the extremes as attributes."""
     gradients, dataset = gradients_of(result), to_gradient_dataset(result)
     dataset.attrs["parameters"] = json.dumps([asdict(parameter) for parameter in gradients.parameters])
@@ -285,10 +302,15 @@ def gradient_group(result: RunData) -> xr.Dataset:
     return dataset
 
 
-def groups_of(result: RunData) -> dict[str, xr.Dataset]:
-    """The polynomials of the motion, where its table cannot make it again, and the derivatives of the run."""
+def groups_of(result: Result) -> dict[str, xr.Dataset]:
+    """The polynomials of the motion, where its table cannot make it again, and the derivatives of the run.
+
+    None below a building: such a file is for other programs.
+    """
     from msfp_gen.scene.file.stored_motion import GROUP, needs_pieces, to_pieces
 
+    if result.mounting is not None:
+        return {}
     motion = {GROUP: to_pieces(result.scene.motion)} if needs_pieces(result.scene) else {}
     return motion | ({} if result.gradients is None else {GRADIENT: gradient_group(result)})
 

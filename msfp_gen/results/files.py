@@ -1,4 +1,4 @@
-"""`ResultFiles`: the files of a result, of one bearing or of a building: netCDF-4, which is read again, and tables.
+"""The files of a result, of one bearing or of a building: netCDF-4, which is read again, and tables.
 
 A file may be damaged, or made by another person. It is data: its scene names no file, its motion lies in it. Every file
 that is not as expected is refused with one InputError.
@@ -10,16 +10,14 @@ import json
 import math
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
-from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output, replacing, write_bytes
 from msfp_gen.common.tables import TABLE_SUFFIXES, parquet_bytes
 from msfp_gen.motions.motion import Motion
@@ -31,6 +29,7 @@ from msfp_gen.results.variables import Arrays, Places, columns_of
 if TYPE_CHECKING:
     import xarray as xr
 
+    from msfp_gen.results.result import AnyResult
 
 COUNTER, PROVENANCE = "counter_", "provenance_"  # prefixes of the attributes with counters and provenance
 EDITION = "edition"  # attribute: of the names in a file; that of another version of msfp-gen differs if these do
@@ -65,144 +64,95 @@ class Storage:
     derived: Collection[str] = ()
 
 
-class ResultFiles:
-    """The files of a result, and the identity of its scene.
+def to_netcdf(result: AnyResult, path: str | Path) -> Path:
+    """Write the dataset and the scene as netCDF-4 file, completely or not at all; a failed run with its status.
 
-    source: the attribute of a file by which its kind of result is known. storage: what makes its dataset, and reads its
-    files; a bearing of a building has none.
+    Derivatives with respect to parameters are in its group `gradient`.
+
+    Raises InputError where the suffix is not .nc or the folder does not exist.
     """
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
 
-    source: ClassVar[str]
-    storage: ClassVar[Storage]
+    path = check_output(path, DATASET_SUFFIXES)
+    dataset = result.dataset
+    # The file is made in memory, because HDF5 crashes instead of raising an error when the disk is full.
+    content = BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        dataset.dump_to_store(H5NetCDFStore(file), encoding=_encoding(dataset))
+        for name, group in result.groups.items():
+            group.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(group))
+    write_bytes(path, [content.getbuffer()])
+    return path
 
-    @cached_property
-    def dataset(self) -> xr.Dataset:
-        """Rows, and events, as an xarray.Dataset, with units, meanings and signs in attributes; built at first use."""
-        return self.storage.to_dataset(self)
 
-    @property
-    def groups(self) -> dict[str, xr.Dataset]:
-        """The groups of the netCDF-4 file beside the dataset, by name."""
-        return self.storage.groups_of(self)
+def to_csv(result: AnyResult, path: str | Path, columns: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
+    """Write a CSV file: one comment, `name [unit]` as header, one line per row; then the origin as # comments.
 
-    if TYPE_CHECKING:  # fields of the subclasses, or properties
+    The origin is the attributes of the dataset, the events, and the scene as TOML text. columns, sign: as of
+    `export_columns`. Raises InputError where the suffix is not .csv or the folder does not exist.
+    """
+    target = check_output(path, (".csv",))
+    dataset = signed(result.dataset, sign)
+    table = selected_columns(table_of(dataset), columns)
+    rows = np.column_stack([column.values for column in table]).tolist()
+    title = " ".join(f"{result.title}, status {result.status}".split())
+    about = "versions, events and scene stand after them"
+    with replacing(target) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(f"# {title}; {_sign_text(sign)}; {len(rows)} rows; {about}\n")
+        file.write(",".join(f"{column.name} [{column.unit}]" for column in table) + "\n")
+        file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+        file.writelines(f"# {line}\n" for line in _origin(dataset))
+    return target
 
-        @property
-        def scene(self) -> Any:
-            """The scene that was run."""
 
-        @property
-        def status(self) -> str:
-            """How the run ended."""
+def to_parquet(result: AnyResult, path: str | Path, columns: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
+    """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file.
 
-        @property
-        def message(self) -> str:
-            """One line of text, "" for a run that succeeded."""
+    columns, sign: as of `export_columns`. Raises InputError as `to_csv` does.
+    """
+    target = check_output(path, (".parquet",))
+    dataset = signed(result.dataset, sign)
+    table = selected_columns(table_of(dataset), columns)
+    about = {str(key): str(value) for key, value in dataset.attrs.items()}
+    about |= {"sign": _sign_text(sign), "events": json.dumps(_events(dataset))}
+    arrays = {(column.name, column.unit): np.ascontiguousarray(column.values) for column in table}
+    meanings = {column.name: column.meaning for column in table}
+    write_bytes(target, [parquet_bytes(arrays, dict.fromkeys(meanings, "double"), about, meanings)])
+    return target
 
-        @property
-        def notes(self) -> tuple[Note, ...]:
-            """Messages of the monitors."""
 
-    @property
-    def title(self) -> str:
-        """Name of the scene, as the head of a table."""
-        return self.scene.name or "unnamed scene"
+def to_mat(result: AnyResult, path: str | Path) -> Path:
+    """Write a MATLAB 5 file: every variable of the dataset by name, and structs `units`, `meaning`, `attributes`.
 
-    @property
-    def identity(self) -> str:
-        """The sha256 of the scene, motions and matrices included, as in checkpoints; provenance names the versions."""
-        return fingerprint(self.scene)
+    Raises InputError as `to_csv` does.
+    """
+    from scipy.io import savemat
 
-    @property
-    def succeeded(self) -> bool:
-        """Whether the run reached its end or its stop condition."""
-        return self.status in ("ok", "stopped")
+    target, dataset = check_output(path, (".mat",)), result.dataset
+    # One-dimensional arrays become column vectors, as usual in MATLAB, and texts become cells.
+    arrays = {str(name): variable.to_numpy() for name, variable in dataset.variables.items()}
+    content: dict[str, Any] = {n: v.astype(object) if v.dtype.kind == "U" else v for n, v in arrays.items()}
+    for key, attribute in (("units", "units"), ("meaning", "long_name")):
+        content[key] = {str(n): v.attrs[attribute] for n, v in dataset.variables.items() if attribute in v.attrs}
+    content["attributes"] = {str(key): value for key, value in dataset.attrs.items()}
+    stream = BytesIO()
+    savemat(stream, content, oned_as="column", long_field_names=True, do_compression=True)
+    write_bytes(target, [stream.getbuffer()])
+    return target
 
-    def to_netcdf(self, path: str | Path) -> Path:
-        """Write the dataset and the scene as netCDF-4 file, completely or not at all; a failed run with its status.
 
-        Derivatives with respect to parameters are in its group `gradient`.
-
-        Raises InputError where the suffix is not .nc or the folder does not exist.
-        """
-        import h5netcdf
-        from xarray.backends import H5NetCDFStore
-
-        path = check_output(path, DATASET_SUFFIXES)
-        dataset = self.dataset
-        # The file is made in memory, because HDF5 crashes instead of raising an error when the disk is full.
-        content = BytesIO()
-        with h5netcdf.File(content, "w") as file:
-            dataset.dump_to_store(H5NetCDFStore(file), encoding=_encoding(dataset))
-            for name, group in self.groups.items():
-                group.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(group))
-        write_bytes(path, [content.getbuffer()])
-        return path
-
-    def to_csv(self, path: str | Path, columns: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
-        """Write a CSV file: one comment, `name [unit]` as header, one line per row; then the origin as # comments.
-
-        The origin is the attributes of the dataset, the events, and the scene as TOML text. columns, sign: as of
-        `export_columns`. Raises InputError where the suffix is not .csv or the folder does not exist.
-        """
-        target = check_output(path, (".csv",))
-        dataset = signed(self.dataset, sign)
-        table = selected_columns(table_of(dataset), columns)
-        rows = np.column_stack([column.values for column in table]).tolist()
-        title = " ".join(f"{self.title}, status {self.status}".split())
-        about = "versions, events and scene stand after them"
-        with replacing(target) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(f"# {title}; {_sign_text(sign)}; {len(rows)} rows; {about}\n")
-            file.write(",".join(f"{column.name} [{column.unit}]" for column in table) + "\n")
-            file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
-            file.writelines(f"# {line}\n" for line in _origin(dataset))
-        return target
-
-    def to_parquet(self, path: str | Path, columns: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
-        """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file.
-
-        columns, sign: as of `export_columns`. Raises InputError as `to_csv` does.
-        """
-        target = check_output(path, (".parquet",))
-        dataset = signed(self.dataset, sign)
-        table = selected_columns(table_of(dataset), columns)
-        about = {str(key): str(value) for key, value in dataset.attrs.items()}
-        about |= {"sign": _sign_text(sign), "events": json.dumps(_events(dataset))}
-        arrays = {(column.name, column.unit): np.ascontiguousarray(column.values) for column in table}
-        meanings = {column.name: column.meaning for column in table}
-        write_bytes(target, [parquet_bytes(arrays, dict.fromkeys(meanings, "double"), about, meanings)])
-        return target
-
-    def to_mat(self, path: str | Path) -> Path:
-        """Write a MATLAB 5 file: every variable of the dataset by name, and structs `units`, `meaning`, `attributes`.
-
-        Raises InputError as `to_csv` does.
-        """
-        from scipy.io import savemat
-
-        target, dataset = check_output(path, (".mat",)), self.dataset
-        # One-dimensional arrays become column vectors, as usual in MATLAB, and texts become cells.
-        arrays = {str(name): variable.to_numpy() for name, variable in dataset.variables.items()}
-        content: dict[str, Any] = {n: v.astype(object) if v.dtype.kind == "U" else v for n, v in arrays.items()}
-        for key, attribute in (("units", "units"), ("meaning", "long_name")):
-            content[key] = {str(n): v.attrs[attribute] for n, v in dataset.variables.items() if attribute in v.attrs}
-        content["attributes"] = {str(key): value for key, value in dataset.attrs.items()}
-        stream = BytesIO()
-        savemat(stream, content, oned_as="column", long_field_names=True, do_compression=True)
-        write_bytes(target, [stream.getbuffer()])
-        return target
-
-    def save(self, path: str | Path) -> Path:
-        """Write the format of the suffix: .nc, .parquet, .csv or .mat. Raises InputError as the other writers do."""
-        target = check_result_path(path)
-        return WRITERS[target.suffix.lower()](self, target)
+def save(result: AnyResult, path: str | Path) -> Path:
+    """Write the format of the suffix: .nc, .parquet, .csv or .mat. Raises InputError as the other writers do."""
+    target = check_result_path(path)
+    return WRITERS[target.suffix.lower()](result, target)
 
 
 WRITERS: dict[str, Callable[..., Path]] = {
-    ".nc": ResultFiles.to_netcdf,
-    ".parquet": ResultFiles.to_parquet,
-    ".csv": ResultFiles.to_csv,
-    ".mat": ResultFiles.to_mat,
+    ".nc": to_netcdf,
+    ".parquet": to_parquet,
+    ".csv": to_csv,
+    ".mat": to_mat,
 }
 
 
@@ -215,7 +165,7 @@ def check_result_path(path: str | Path, name: str = "output") -> Path:
 
 
 def export_columns(
-    result: ResultFiles, path: str | Path, names: Sequence[str] | None = None, sign: str = DEFAULT
+    result: AnyResult, path: str | Path, names: Sequence[str] | None = None, sign: str = DEFAULT
 ) -> Path:
     """Write some columns of `result` as CSV or Parquet, by the suffix; time is always the first.
 

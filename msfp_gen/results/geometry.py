@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import asin, cos, sin
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.history import History
-from msfp_gen.results.run_data import RunData
 from msfp_gen.scene.bearing import Bearing
+
+if TYPE_CHECKING:
+    from msfp_gen.results.result import Result
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +45,7 @@ class Poses:
         return len(self.basis)
 
 
-def poses(result: RunData) -> Poses:
+def poses(result: Result) -> Poses:
     """The stack of `result` in every row; `joining.at_times` gives a result with rows at other times."""
     history, bearing, motion = result.history, result.scene.bearing, result.scene.motion
     base = motion.rotation(np.clip(history.time, 0.0, motion.duration))
@@ -108,7 +111,7 @@ def contact_offsets(bearing: Bearing, history: History) -> Array:
     return offsets * bearing.arrays()["radius"]
 
 
-def friction_circles(result: RunData) -> Array:
+def friction_circles(result: Result) -> Array:
     """Radius mu R/sqrt(1 + mu^2) of the friction circle of every surface, ndarray, shape (T, n-1) [m].
 
     While the surface slides, the line of force is tangent to this circle about the sphere centre (docs/model.md).
@@ -280,7 +283,7 @@ class Section:
     forces: Array
 
 
-def sections(result: RunData, azimuth: float | None = None) -> list[Section]:
+def sections(result: Result, azimuth: float | None = None) -> list[Section]:
     """The section of `result` in every row, along `azimuth` [rad] from E1; None: along the largest displacement.
 
     The plane passes through the mean position of the sliders, so that it also cuts all bodies of a stack that has moved
@@ -304,7 +307,7 @@ def sections(result: RunData, azimuth: float | None = None) -> list[Section]:
     return sections
 
 
-def azimuth_of(result: RunData) -> float:
+def azimuth_of(result: Result) -> float:
     """Azimuth [rad] of the vertical plane of the largest displacement, in (-pi/2, pi/2]; 0 without displacement."""
     history = result.history
     u1, u2 = history.displacement[history.peak_row, :2]

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
-from msfp_gen.results.files import ResultFiles
 from msfp_gen.results.history import History, quantities
+
+if TYPE_CHECKING:
+    from msfp_gen.results.result import AnyResult
 
 Ends = tuple[History, History]
 
@@ -116,7 +118,7 @@ def concatenated(parts: Sequence[History]) -> History:
     return History(**columns, energy={name: whole([part.energy[name] for part in parts]) for name in parts[0].energy})
 
 
-R = TypeVar("R", bound=ResultFiles)
+R = TypeVar("R", bound="AnyResult")
 
 
 def at_times(result: R, times: ArrayLike) -> R:

@@ -6,16 +6,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
-from msfp_gen.results.history import first_peak
-from msfp_gen.results.run_data import BearingData, RunData
+from msfp_gen.results.history import History, first_peak
 from msfp_gen.results.sliding import slides_over
 from msfp_gen.scene.bearing import Bearing
+
+if TYPE_CHECKING:
+    from msfp_gen.results.result import Result
 
 REVERSAL = 0.02  # least reverse motion after a turning point, over the range of the run
 CLOSURE = 0.05  # largest distance between start and end of a closed cycle, over its range
@@ -214,7 +216,7 @@ class SurfaceDemand:
     maximum_uplift: float | None
 
 
-def surface_demands(one: BearingData, rows: slice | None = None) -> tuple[SurfaceDemand, ...]:
+def surface_demands(one: Result, rows: slice | None = None) -> tuple[SurfaceDemand, ...]:
     """Demands on every surface over `rows`, bottom first; over the whole run, its steps included, without them."""
     history, extremes, whole = one.history, one.extremes, rows is None
     rows = slice(None) if rows is None else rows
@@ -222,7 +224,7 @@ def surface_demands(one: BearingData, rows: slice | None = None) -> tuple[Surfac
     least_gap = extremes.gap if whole else gap.min(axis=0)
     most_lift = extremes.lift if whole and extremes.lift is not None else lift.max(axis=0)
     has_uplift = one.effects.uplift or bool(history.lift.any())  # a monitor may add uplift during the run
-    slips = _slips(one, rows, whole) if isinstance(one, RunData) else None
+    slips = _slips(one, rows, whole) if isinstance(one.history, History) else None
     return tuple(
         SurfaceDemand(
             surface=i + 1,
@@ -239,7 +241,7 @@ def surface_demands(one: BearingData, rows: slice | None = None) -> tuple[Surfac
     )
 
 
-def _slips(result: RunData, rows: slice, whole: bool) -> tuple[Array, Array, Array]:
+def _slips(result: Result, rows: slice, whole: bool) -> tuple[Array, Array, Array]:
     """Largest slip velocity [m/s] and friction power [W], and its integral [J], of every surface, shape (n-1,) each."""
     history, fastest = result.history, result.extremes.slip_speed
     speed = np.where(history.separated, 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
@@ -306,7 +308,7 @@ class Branch:
     transitions: tuple[Transition, ...]
 
 
-def signed_slip(result: RunData, direction: Array) -> tuple[Array, Array]:
+def signed_slip(result: Result, direction: Array) -> tuple[Array, Array]:
     """Slip of every surface along the unit vector `direction`, shape (2,), and its plastic part: (T, n-1) each [m]."""
     history, bearing = result.history, result.scene.bearing
     # t_3 of a body tilts towards (theta, -psi); the slip of a surface that is concave up is opposite to it (3.19).

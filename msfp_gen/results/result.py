@@ -1,10 +1,13 @@
-"""`Result`: the result of a run; `AnyResult`: what those of a building and of one of its bearings offer alike."""
+"""`Result`: the result of the run of one bearing, alone or below a building; `AnyResult`: what all results offer.
+
+What can be done with any result is a function of `files.py`, `summary.py` and their neighbours; the methods are those.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -14,24 +17,28 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
+from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.tables import Table
-from msfp_gen.results import dataset
+from msfp_gen.results import dataset, files
 from msfp_gen.results.characterise import Characterisation
 from msfp_gen.results.characterise import characterise as characterise_bearing
-from msfp_gen.results.files import ResultFiles, Storage, read_result
-from msfp_gen.results.note import by_importance
-from msfp_gen.results.run_data import BearingData, RunData
+from msfp_gen.results.files import Storage, read_result
+from msfp_gen.results.gradients import Gradients
+from msfp_gen.results.history import Counters, Event, Extremes, History
+from msfp_gen.results.note import Note, by_importance
 from msfp_gen.results.summary import (
     rows_of_bearing,
     summarise,
     summarise_gradients,
     surface_table,
-    time_row,
     transition_table,
     work_rows,
 )
 from msfp_gen.results.verdict import Verdict, verdict_of
+from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import kinds
+from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,11 +57,62 @@ class Curve(NamedTuple):
     caption: str
 
 
-class AnyResult(ResultFiles, ABC):
-    """Summary, printed text, tables and characterisation of a result.
+class AnyResult(ABC):
+    """What results of one bearing and of a building offer: dataset, files, summary, verdict, tables, printed text.
 
+    source: the attribute of a file by which its kind of result is known. storage: what makes its dataset, and reads its
+    files. scene: what was run. status: how the run ended; message: one line of text, "" for a run that succeeded.
     counters: of the work of the solver. notes: messages of the monitors, in order of time (docs/effects.md).
     """
+
+    source: ClassVar[str]
+    storage: ClassVar[Storage]
+
+    if TYPE_CHECKING:  # fields of the subclasses, or properties
+
+        @property
+        def scene(self) -> Any:
+            """The scene that was run."""
+
+        @property
+        def status(self) -> str:
+            """How the run ended."""
+
+        @property
+        def message(self) -> str:
+            """One line of text, "" for a run that succeeded."""
+
+        @property
+        def notes(self) -> tuple[Note, ...]:
+            """Messages of the monitors."""
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """Rows, and events, as an xarray.Dataset, with units, meanings and signs in attributes; built at first use."""
+        return self.storage.to_dataset(self)
+
+    @property
+    def groups(self) -> dict[str, xr.Dataset]:
+        """The groups of the netCDF-4 file beside the dataset, by name."""
+        return self.storage.groups_of(self)
+
+    to_netcdf, to_csv, to_parquet, to_mat = files.to_netcdf, files.to_csv, files.to_parquet, files.to_mat
+    save = files.save
+
+    @property
+    def title(self) -> str:
+        """Name of the scene, as the head of a table."""
+        return self.scene.name or "unnamed scene"
+
+    @property
+    def identity(self) -> str:
+        """The sha256 of the scene, motions and matrices included, as in checkpoints; provenance names the versions."""
+        return fingerprint(self.scene)
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the run reached its end or its stop condition."""
+        return self.status in ("ok", "stopped")
 
     @cached_property
     @abstractmethod
@@ -76,7 +134,7 @@ class AnyResult(ResultFiles, ABC):
 
     @property
     @abstractmethod
-    def bearings(self) -> Sequence[OneBearing]:
+    def bearings(self) -> Sequence[Result]:
         """The results of the bearings of the run."""
 
     @abstractmethod
@@ -142,16 +200,151 @@ class AnyResult(ResultFiles, ABC):
         )
 
 
-class OneBearing(AnyResult, BearingData):
-    """The result of one bearing, alone or of a building."""
+@dataclass(frozen=True)
+class Mounting:
+    """What a building tells of one of its bearings.
+
+    number: of the bearing, from 1. label: its number and name, for messages. effects: of its model at the start.
+    axial_load: compression at rest [N]. interface: between bearing and building. summary: what the summary of a bearing
+    has of the building.
+    """
+
+    number: int
+    label: str
+    bearing: Bearing
+    effects: Effects
+    axial_load: float
+    interface: Any
+    summary: Mapping[str, Any]
+
+
+# (word of an extreme, field of the history) -> field of `Extremes`, the same over all steps of a run.
+OVER_STEPS = {
+    ("peak", "displacement"): "displacement",
+    ("peak", "top_force"): "top_force",
+    ("peak", "sliding"): "sliding",
+    ("most", "sliding"): "sliding",
+    ("least", "gap"): "gap",
+    ("least", "normal_force"): "least_normal",
+    ("most", "normal_force"): "most_normal",
+    ("least", "friction_coefficient"): "least_friction",
+    ("most", "friction_coefficient"): "most_friction",
+    ("most", "temperature"): "temperature",
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(AnyResult):
+    """The result of `simulate`, or one bearing of the result of a building.
+
+    A RunError has one in `.result` if the run failed after its start.
+
+    history: rows; below a building those of `BearingRows` alone, with the displacement across bearing and interface,
+    base_displacement of the ground below it, and top_moment about its upper end. events: located by the run; none below
+    a building. status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one
+    line of text, "" for a run that succeeded. counters: the work of the solver. provenance: versions, model keys and
+    solver options with which the result was computed. notes: messages of the monitors, in order of time
+    (docs/effects.md). recorded_extremes: of all accepted steps; None where only the rows are known. gradients:
+    derivatives with respect to parameters; None: not computed. mounting: None for a bearing alone; below a building,
+    whose scene is `scene`, what that tells of the bearing.
+    """
+
+    source: ClassVar[str] = "msfp-gen"
+    storage: ClassVar[Storage] = dataset.STORAGE
+    scene: Scene
+    history: History
+    events: tuple[Event, ...] = ()
+    counters: Counters = field(default_factory=Counters)
+    status: str = "ok"
+    message: str = ""
+    provenance: dict[str, str] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
+    recorded_extremes: Extremes | None = None
+    gradients: Gradients | None = None
+    mounting: Mounting | None = None
 
     @property
-    def bearings(self) -> tuple[OneBearing]:
+    def bearings(self) -> tuple[Result]:
         """The bearing itself."""
         return (self,)
 
+    @property
+    def number(self) -> int:
+        """Number of the bearing below a building, from 1; 0: the bearing is alone."""
+        return 0 if self.mounting is None else self.mounting.number
+
+    @property
+    def label(self) -> str:
+        """Number and name of the bearing below a building, for messages; "" for a bearing alone."""
+        return "" if self.mounting is None else self.mounting.label
+
+    @property
+    def title(self) -> str:
+        """Name of the scene, below a building after the label, as the head of a table."""
+        return f"{self.label} of {super().title}" if self.label else super().title
+
+    @property
+    def bearing(self) -> Bearing:
+        """The bearing that was run."""
+        return self.scene.bearing if self.mounting is None else self.mounting.bearing
+
+    @property
+    def effects(self) -> Effects:
+        """The effects of the model at the start."""
+        return self.scene.modelled if self.mounting is None else self.mounting.effects
+
+    @property
+    def axial_load(self) -> float | None:
+        """Constant axial load on the top plate, below a building at rest [N]; None if there is none, or it varies."""
+        return constant_load(self.scene) if self.mounting is None else self.mounting.axial_load
+
+    @property
+    def one_pendulum(self) -> bool:
+        """Whether its surfaces are those of one pendulum in place of the stack (docs/fidelity.md)."""
+        return self.scene.fidelity == "equivalent"
+
+    @property
+    def model_changes(self) -> tuple[Note, ...]:
+        """The notes after which the run continued with another model; `action` states its effects."""
+        return tuple(note for note in self.notes if note.action)
+
+    @property
+    def time(self) -> Array:
+        """Times of the rows, ndarray, shape (T,), [s]."""
+        return self.history.time
+
+    @cached_property
+    def extremes(self) -> Extremes:
+        """Extremes over all accepted steps, and rows of a bearing alone."""
+        recorded = self.recorded_extremes
+        if recorded is not None and self.mounting is not None:
+            return recorded
+        rows = Extremes.of_rows(self.history)
+        return rows if recorded is None else rows | recorded
+
+    def over_steps(self, word: str, field: str) -> Array | None:
+        """An extreme of a field of the history over all steps, ndarray, shape (m,), [SI]; None: it is not recorded.
+
+        word: "peak", "least" or "most". m: the columns of the field.
+        """
+        name = OVER_STEPS.get((word, field))
+        return None if name is None else getattr(self.extremes, name)
+
+    @property
+    def friction_coefficient(self) -> Array:
+        """Friction coefficient mu of every surface, ndarray, shape (T, n-1), [-]: recorded, or that of the bearing."""
+        recorded = self.history.friction_coefficient
+        if recorded is not None:
+            return recorded
+        return np.broadcast_to(self.bearing.arrays()["friction"], self.history.normal_force.shape)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Main results of the run in SI units, as values that JSON can hold; `summary.summarise` lists the keys."""
+        return summarise(self) | {"verdict": self.verdict.as_dict}
+
     def main_results(self) -> Rows:
-        """Label and value of the peaks of the bearing."""
+        """Label and value of the main results."""
         return rows_of_bearing(self.summary)
 
     @property
@@ -159,6 +352,10 @@ class OneBearing(AnyResult, BearingData):
         """The hysteresis loop: force over displacement along the direction of the largest displacement."""
         rows = self.history
         return Curve(rows.path[0], rows.top_force[:, :2] @ rows.direction, "force over displacement")
+
+    def work_rows(self) -> Rows:
+        """Label and value of the energy of the run and of the work of the solver; none below a building."""
+        return work_rows(self.summary) if self.mounting is None else []
 
     def part_tables(self) -> list[Table]:
         """Tables of the surfaces, and of the transitions of a monotonic run; none of one pendulum in their place."""
@@ -176,31 +373,6 @@ class OneBearing(AnyResult, BearingData):
         """
         return characterise_bearing(self)
 
-
-@dataclass(frozen=True, eq=False, init=False, repr=False)
-class Result(OneBearing, RunData):
-    """The result of `simulate`; a RunError has one in `.result` if the run failed after its start.
-
-    status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one line of
-    text, "" for a run that succeeded. counters: the work of the solver. provenance: versions, model keys and solver
-    options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
-    """
-
-    storage: ClassVar[Storage] = dataset.STORAGE
-
-    @cached_property
-    def summary(self) -> dict[str, Any]:
-        """Main results of the run in SI units, as values that JSON can hold; `summary.summarise` lists the keys."""
-        return summarise(self) | {"verdict": self.verdict.as_dict}
-
-    def main_results(self) -> Rows:
-        """Label and value of the main results."""
-        return [time_row(self.summary), *super().main_results()]
-
-    def work_rows(self) -> Rows:
-        """Label and value of the energy of the run and of the work of the solver."""
-        return work_rows(self.summary)
-
     @cached_property
     def gradient(self) -> xr.Dataset:
         """Derivatives of the dataset with respect to parameters, first dimension `parameter`; docs/gradients.md.
@@ -216,6 +388,22 @@ class Result(OneBearing, RunData):
         Raises InputError where the run computed none.
         """
         return summarise_gradients(self)
+
+
+def constant_load(scene: Scene) -> float | None:
+    """The constant axial load on the top plate [N]; None if there is none, or it varies."""
+    loads: dict[str, Callable[[Any], float]] = {
+        "rig": lambda top: top.axial_load,
+        "prescribed": lambda top: -top.force[2],
+        "mass": lambda top: top.mass * scene.bearing.gravity,
+    }
+    load = loads[scene.top.kind](scene.top)
+    if scene.load is not None:
+        vertical = scene.load.coefficients[:, 2]
+        if np.any(vertical[:, 1:]) or np.any(vertical[:, 0] != vertical[0, 0]):
+            return None
+        load -= float(vertical[0, 0])
+    return load if load > 0 else None
 
 
 def _svg(x: Array, y: Array) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,12 +12,14 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.results.dataset import gradients_of
-from msfp_gen.results.files import ResultFiles
+from msfp_gen.results.gradients import Gradients, gradients_of_extremes
 from msfp_gen.results.history import BearingRows, History, by_axis
-from msfp_gen.results.run_data import BearingData, Gradients, RunData, gradients_of_extremes
 from msfp_gen.results.sliding import SHARE, merged, open_times, slip_shares
 from msfp_gen.scene.bearing import Surface
 from msfp_gen.scene.parameters import Parameter
+
+if TYPE_CHECKING:
+    from msfp_gen.results.result import AnyResult, Result
 
 WINDOW = 2e-4  # displacement over which shares of sliding are taken [m]
 MONOTONIC = 1e-3  # largest reverse or transverse motion of a monotonic run, over the largest displacement
@@ -26,7 +28,7 @@ RIMS = (1, 4)  # surfaces of a four-surface stack whose rims are met (Table 4.2)
 SYMBOLS = {"u_star": "u*", "u_star_star": "u**"}  # keys that PEER 2017/07 writes differently
 
 
-def is_monotonic(result: BearingData) -> bool:
+def is_monotonic(result: Result) -> bool:
     """Whether the run is a monotonic push: its motion is a ramp, or the displacement has no reversal.
 
     Never that of a bearing below a building, whose first contacts of rims are not located.
@@ -41,7 +43,7 @@ def is_monotonic(result: BearingData) -> bool:
     return bool(peak > WINDOW and max(reverse, np.abs(transverse).max()) <= MONOTONIC * peak)
 
 
-def transitions(result: BearingData) -> dict[str, float | None]:
+def transitions(result: Result) -> dict[str, float | None]:
     """Displacements [m], and forces over the axial load [-], at which the sliding regimes of a monotonic run change.
 
     Stacks of four surfaces have u_star, u_star_star (surfaces 2, 3 stop sliding) and u_dr1, u_dr4, F_dr1, F_dr4 (first
@@ -96,7 +98,7 @@ def _spacing(history: BearingRows, displacement: float) -> float:
     return float(maxima[row] - maxima[row - 1])
 
 
-def _first_contact(result: BearingData, surface: int) -> tuple[float, float] | tuple[None, None]:
+def _first_contact(result: Result, surface: int) -> tuple[float, float] | tuple[None, None]:
     """Displacement [m] and force [N] along the direction of the run at the first contact with the rim of `surface`."""
     direction = result.history.direction
     for event in result.events:
@@ -105,7 +107,7 @@ def _first_contact(result: BearingData, surface: int) -> tuple[float, float] | t
     return None, None
 
 
-def summarise(result: RunData) -> dict[str, Any]:
+def summarise(result: Result) -> dict[str, Any]:
     """Summary of a `Result` as plain data, ready for JSON; SI units; lists are one value per surface, bottom first.
 
     Keys:
@@ -132,7 +134,15 @@ def summarise(result: RunData) -> dict[str, Any]:
         least_friction, most_friction: coefficients, of runs with a friction law.
         peak_temperature: [degC], of runs with a friction law that heats.
         transitions: of monotonic runs, see `transitions`.
+
+    A bearing below a building has no name of a run, duration, counters and energy balance of its own; its axial_load is
+    at rest. Instead it has number (from 1), name, layout and position in plan [m]; minimum_load_ratio and
+    maximum_load_ratio: axial force over the load at rest, 0 where the bearing lifts [-]; displacement_used: peak
+    displacement over that at which all rims are met [-]; dissipated, and by its interface interface_dissipated: at the
+    end [J].
     """
+    if result.mounting is not None:
+        return {**result.mounting.summary, **summary_of_bearing(result)}
     counters = asdict(result.counters)
     wall_time = counters.pop("wall_time")
     return {
@@ -142,7 +152,7 @@ def summarise(result: RunData) -> dict[str, Any]:
     }
 
 
-def summary_of_run(result: ResultFiles, time: Array, counters: Mapping[str, int], wall_time: float) -> dict[str, Any]:
+def summary_of_run(result: AnyResult, time: Array, counters: Mapping[str, int], wall_time: float) -> dict[str, Any]:
     """The part of a summary that bearings and buildings have: name, how the run ended, its duration and its work."""
     duration = float(result.scene.end if result.status == "ok" else time[-1])  # rows may end before a complete run
     return {
@@ -169,7 +179,7 @@ OF_SURFACES = {
 }
 
 
-def summary_of_bearing(one: BearingData) -> dict[str, Any]:
+def summary_of_bearing(one: Result) -> dict[str, Any]:
     """The part of a summary that all bearings have, alone or below a building."""
     extremes, load, sheet = one.extremes, one.axial_load, one.bearing.friction_at_pivot
     force = by_axis(extremes.top_force)
@@ -194,7 +204,7 @@ def summary_of_bearing(one: BearingData) -> dict[str, Any]:
     return summary | ({"transitions": transitions(one)} if is_monotonic(one) else {})
 
 
-def uplift_of(one: BearingData) -> dict[str, Any]:
+def uplift_of(one: Result) -> dict[str, Any]:
     """Uplift of a bearing.
 
     Keys:
@@ -210,20 +220,36 @@ def uplift_of(one: BearingData) -> dict[str, Any]:
 
 
 def rows_of_bearing(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Label and value of the peaks in the summary of a bearing."""
+    """Label and value of the main results in the summary of a bearing."""
+    below = "position" in summary  # of a building
+    about = _place_row(summary) if below else time_row(summary)
+    loads = [("N over N at rest", ratios_text(summary))] if below else []
     ratio = "" if summary["peak_force_ratio"] is None else f" ({summary['peak_force_ratio']:.3f} of the axial load)"
     whole = [
+        about,
         ("peak displacement", _along(summary["peak_displacement"], 1e3, "mm")),
         ("peak force", _along(summary["peak_force"], 1e-3, "kN") + ratio),
     ]
     if "peak_sliding" not in summary:  # of one pendulum in place of the stack
-        return whole
+        return whole + loads
     least, most = min(summary["minimum_normal_force"]), max(summary["maximum_normal_force"])
     return [
         *whole,
         ("peak sliding", ", ".join(f"{1e3 * s:.4g}" for s in summary["peak_sliding"]) + " mm, bottom first"),
         ("normal force", f"{1e-3 * least:.4g} to {1e-3 * most:.4g} kN"),
+        *loads,
     ]
+
+
+def _place_row(summary: Mapping[str, Any]) -> tuple[str, str]:
+    x, y = summary["position"]
+    return "bearing", f"{summary['layout']} at ({x:g}, {y:g}) m"
+
+
+def ratios_text(summary: Mapping[str, Any], to: str = " to ") -> str:
+    """Least and largest axial force over the load at rest; 0 where the bearing lifts."""
+    least, most = summary["minimum_load_ratio"], summary["maximum_load_ratio"]
+    return f"{least:.2f}{' (lifts)' if least == 0 else ''}{to}{most:.2f}"
 
 
 def _along(peaks: Mapping[str, float], scale: float, unit: str) -> str:
@@ -252,7 +278,7 @@ def energy_balance(history: History) -> dict[str, float | None]:
     }
 
 
-def rims_met(result: BearingData) -> list[int]:
+def rims_met(result: Result) -> list[int]:
     """Surfaces (1..n-1) whose slider reached its rim, by an event or by a gap of zero or less in some row."""
     located = {event.surface for event in result.events if event.kind == "rim_contact"}
     closed = np.flatnonzero(result.extremes.gap <= 0) + 1
@@ -278,7 +304,7 @@ class SummaryGradient(dict[str, Any]):
         raise InputError(f"gradient_summary: {key!r} has no derivative: {reason}; give one of {', '.join(self)}")
 
 
-def summarise_gradients(result: RunData) -> dict[str, dict[str, Any]]:
+def summarise_gradients(result: Result) -> dict[str, dict[str, Any]]:
     """Derivatives of the scalars of `summarise(result)` in SI units, by the path of the parameter.
 
     Keys: peak_displacement, peak_force, peak_force_ratio, peak_sliding, minimum_gap, minimum_normal_force,
@@ -317,7 +343,7 @@ def _summary(gradients: Gradients, index: int, slopes: dict[str, Array], ratio: 
     return gradient
 
 
-def _ratio_slope(result: RunData, parameter: Parameter, slope: float) -> float | None:
+def _ratio_slope(result: Result, parameter: Parameter, slope: float) -> float | None:
     """Derivative of peak radial force over axial load; None without a constant load."""
     load = result.axial_load
     if not load:
@@ -326,7 +352,7 @@ def _ratio_slope(result: RunData, parameter: Parameter, slope: float) -> float |
     return slope / load - peak * _load_slope(result, parameter) / load**2
 
 
-def _load_slope(result: RunData, parameter: Parameter) -> float:
+def _load_slope(result: Result, parameter: Parameter) -> float:
     """Derivative of `axial_load` with respect to a parameter."""
     scene, name = result.scene, parameter.path
     gravity, mass = scene.bearing.gravity, float(getattr(scene.top, "mass", 0.0)) if scene.top.kind == "mass" else 0.0

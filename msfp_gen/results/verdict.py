@@ -6,17 +6,19 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
-from msfp_gen.results.run_data import BearingData
 from msfp_gen.results.sliding import open_times
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.friction_parameters import start_temperatures
 from msfp_gen.scene.scene_fields import Limits
+
+if TYPE_CHECKING:
+    from msfp_gen.results.result import Result
 
 RIM_SHARE = 1 / 3  # rim force over the axial load, up to which the spring of a rim was compared
 COMPRESSION_SHARE = 0.1  # compression of a rim over the capacity of its surface
@@ -38,7 +40,7 @@ class Value(NamedTuple):
     allowed: float
 
 
-Reader = Callable[[BearingData, Limits], Iterable[Value]]
+Reader = Callable[["Result", Limits], Iterable[Value]]
 
 
 @dataclass(frozen=True)
@@ -195,7 +197,7 @@ class Verdict:
 
 
 def verdict_of(
-    bearings: Iterable[BearingData],
+    bearings: Iterable[Result],
     limits: Limits | None,
     failure: str,
     stopped: float | None = None,
@@ -213,20 +215,20 @@ def verdict_of(
     return Verdict(tuple(readings), failure, stopped, whole)
 
 
-def _by_surface(one: BearingData, rows: Array, reached: Array, allowed: Array | float) -> Iterator[Value]:
+def _by_surface(one: Result, rows: Array, reached: Array, allowed: Array | float) -> Iterator[Value]:
     """Values of every surface. rows: of the same quantity, shape (T, n-1)."""
     allowed = np.broadcast_to(allowed, reached.shape)
     for surface, (own, value, most) in enumerate(zip(rows.T, reached, allowed, strict=True), start=1):
         yield Value(surface, _time_of(one, own, float(value)), float(value), float(most))
 
 
-def _time_of(one: BearingData, rows: Array, value: float) -> float | None:
+def _time_of(one: Result, rows: Array, value: float) -> float | None:
     """The time of the row with the largest value, shape (T,); None where the rows do not have what was reached."""
     row = int(rows.argmax())
     return float(one.history.time[row]) if rows[row] >= (1 - IN_ROWS) * value else None
 
 
-def _rim_force(one: BearingData, limits: Limits) -> Iterator[Value]:
+def _rim_force(one: Result, limits: Limits) -> Iterator[Value]:
     """The larger of the force in the rows and that of the rim spring at its largest compression over all steps."""
     bearing = one.bearing.arrays()
     rows, reached = one.history.rim_force, np.asarray(one.extremes.rim_force)
@@ -237,19 +239,19 @@ def _rim_force(one: BearingData, limits: Limits) -> Iterator[Value]:
     return _by_surface(one, rows, reached, allowed)
 
 
-def _rim_compression(one: BearingData, limits: Limits) -> Iterable[Value]:
+def _rim_compression(one: Result, limits: Limits) -> Iterable[Value]:
     if not _rims_are_modelled(one):
         return ()  # `beyond_rim` says so
     allowed = limits.rim_compression or COMPRESSION_SHARE * one.bearing.arrays()["capacity"]
     return _by_surface(one, -one.history.gap, np.maximum(0.0, -one.extremes.gap), allowed)
 
 
-def _rims_are_modelled(one: BearingData) -> bool:
+def _rims_are_modelled(one: Result) -> bool:
     """Whether rims carry force wherever a slider went beyond its capacity."""
     return not any(note.kind == "rims" and not note.action for note in one.notes)
 
 
-def _travel(one: BearingData, limits: Limits) -> Iterator[Value]:
+def _travel(one: Result, limits: Limits) -> Iterator[Value]:
     """Rims in contact at one time; one surface must be left to slide.
 
     By the contacts that the run has located, of a building by the rows.
@@ -270,7 +272,7 @@ def _travel(one: BearingData, limits: Limits) -> Iterator[Value]:
     yield Value(0, time, float(most), allowed)
 
 
-def _uplift_height(one: BearingData, limits: Limits) -> Iterator[Value]:
+def _uplift_height(one: Result, limits: Limits) -> Iterator[Value]:
     bearing = one.bearing
     offsets = bearing.arrays()["rim_offset"][[bearing.slider(j) for j in range(len(bearing.surfaces))]]
     allowed = np.full(len(offsets), limits.uplift_height) if limits.uplift_height else offsets
@@ -279,13 +281,13 @@ def _uplift_height(one: BearingData, limits: Limits) -> Iterator[Value]:
             yield value
 
 
-def _uplift_duration(one: BearingData, limits: Limits) -> Iterator[Value]:
+def _uplift_duration(one: Result, limits: Limits) -> Iterator[Value]:
     for surface, spells in enumerate(open_times(one.history, one.events), start=1):
         start, length = max(spells, key=lambda spell: spell[1], default=(0.0, 0.0))
         yield Value(surface, start, length, limits.uplift_duration)
 
 
-def _temperature(one: BearingData, limits: Limits) -> Iterator[Value]:
+def _temperature(one: Result, limits: Limits) -> Iterator[Value]:
     """Temperatures of the friction law, or of the monitor of heat where the law has none.
 
     The monitor does not keep when its largest rise was reached; the time of its note is that of the first one.
@@ -299,7 +301,7 @@ def _temperature(one: BearingData, limits: Limits) -> Iterator[Value]:
             yield Value(note.surface, None, start + note.value, limits.temperature)
 
 
-def _of_bearing(one: BearingData, limits: Limits, name: str) -> Iterator[Value]:
+def _of_bearing(one: Result, limits: Limits, name: str) -> Iterator[Value]:
     """The axial load or the displacement of a whole bearing, where a limit is given."""
     history, extremes = one.history, one.extremes
     rows, reached = {
@@ -310,7 +312,7 @@ def _of_bearing(one: BearingData, limits: Limits, name: str) -> Iterator[Value]:
         yield Value(0, _time_of(one, rows, float(reached)), float(reached), allowed)
 
 
-def _beyond_rim(one: BearingData, limits: Limits) -> Iterator[Value]:
+def _beyond_rim(one: Result, limits: Limits) -> Iterator[Value]:
     """The largest sliding beyond a capacity that the monitor of rims noted, and its row."""
     for note in one.notes:
         if note.kind == "rims" and not note.action:
@@ -323,7 +325,7 @@ def _radius(bearing: Bearing, surface: int) -> float:
     return float(bearing.arrays()["rim_radius"][bearing.slider(surface - 1)])
 
 
-def _face(one: BearingData, limits: Limits) -> Iterator[Value]:
+def _face(one: Result, limits: Limits) -> Iterator[Value]:
     """Distances as a bearing of a building records them, or as the note of a bearing alone states them."""
     offsets, times = one.extremes.contact_offset, one.extremes.contact_time
     if offsets is None or times is None:

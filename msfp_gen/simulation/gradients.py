@@ -19,10 +19,10 @@ from msfp_gen.model.model import Model
 from msfp_gen.model.plane import motion_in_plane, out_of_plane, wrench_in_plane
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.time_grid import snapped
+from msfp_gen.results.gradients import EVENTS, Gradients, energy_terms, gradients_of_extremes
 from msfp_gen.results.history import Event, Extremes
 from msfp_gen.results.note import Note
 from msfp_gen.results.result import Result
-from msfp_gen.results.run_data import EVENTS, Gradients, energy_terms, gradients_of_extremes
 from msfp_gen.scene.effect_selection import quasistatic, slider_period
 from msfp_gen.scene.friction_parameters import derived_slopes, law_parameters
 from msfp_gen.scene.parameters import Parameter, parameters_of

@@ -31,8 +31,8 @@ from msfp_gen.motions.piecewise import ORDER, derivatives
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.motions.time_grid import TimeGrid, snapped
 from msfp_gen.results.geometry import rim_forces
+from msfp_gen.results.gradients import Gradients
 from msfp_gen.results.history import History
-from msfp_gen.results.run_data import Gradients
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import monitor_options

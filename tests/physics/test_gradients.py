@@ -14,8 +14,8 @@ from support.gradients import DAMPED, derivative, double, heated, lifting, singl
 
 from msfp_gen import Effects, Load, Motion, Rotation, Scene, simulate
 from msfp_gen.model.model import Model, build_model
+from msfp_gen.results.gradients import ENERGIES
 from msfp_gen.results.history import ENERGY
-from msfp_gen.results.run_data import ENERGIES
 from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.parameters import Parameter, changed_parameters, parameters_of
 from msfp_gen.simulation.bearing_run import BearingRun

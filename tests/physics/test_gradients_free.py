@@ -12,7 +12,7 @@ from support import Array, scene_of
 from support.gradients import DAMPED, derivative, double, single, step_of, triple, values_around
 
 from msfp_gen import Effects, Motion, Result, Rotation, Scene, load_scene, simulate
-from msfp_gen.results.run_data import energy_terms
+from msfp_gen.results.gradients import energy_terms
 from msfp_gen.scene.parameters import changed_parameters, parameters_of
 
 COMMON = {

@@ -14,10 +14,10 @@ from support.buildings import MOTION, PLACES, pushed, pushed_scene
 from support.synthetic import loops as loops_of_one
 from support.synthetic import opened
 
-from msfp_gen import Effects, InputError, RunError, Solver, characterise, simulate
+from msfp_gen import Effects, InputError, Result, RunError, Solver, characterise, simulate
 from msfp_gen.buildings.notes import _shared
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.figures import plot_loops, plot_orbit, plot_result, plot_sliding
+from msfp_gen.figures import figures_of
 from msfp_gen.results.characterise import characterised, csv_rows
 from msfp_gen.results.files import table_of
 from msfp_gen.results.history import ENERGY_BELOW
@@ -101,7 +101,11 @@ def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
     assert all(table.text for table in found.tables()) and csv_rows(found)
     path = one.save(tmp_path / "one.csv")
     assert path.read_text().startswith("# bearing 2 (B) of frame, status ok; u = base - top")
-    assert all(plot(one) for plot in (plot_result, plot_loops, plot_orbit, plot_sliding))
+    assert isinstance(one, Result) and figures_of(one).keys() < figures_of(alone).keys()
+    for result in (one, alone):
+        assert all(plot(result) for plot in figures_of(one).values())
+        assert result.verdict.ok and result.summary["verdict"]["word"] == "within"
+        assert result.bearings == (result,) and result.bearing.layout.surfaces == result.history.surfaces == 4
     file = one.save(tmp_path / "one.nc")
     assert opened(file).identical(one.dataset)
     with pytest.raises(InputError, match="one bearing of a building; give the file of the building"):
