@@ -24,7 +24,7 @@ from msfp_gen.results.quantities import Source
 from msfp_gen.results.variables import Places
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
-from msfp_gen.scene.friction_parameters import select_friction
+from msfp_gen.scene.friction_parameters import bearing_for, select_friction
 from msfp_gen.scene.scene_fields import Fidelity, Limits
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_seats, check_standing, needed_rotational_stiffness
@@ -347,6 +347,23 @@ class BuildingScene(OtherSystem):
         for index, mount in enumerate(self.bearings):
             with prefixed(f"{self.label(index)}: "):
                 bearings.append(replace(mount, bearing=change(mount.bearing, mount.law)))
+        return replace(self, bearings=bearings)
+
+    @property
+    def every_effects(self) -> tuple[Effects, ...]:
+        """The effects of the model of every bearing at the start."""
+        return self.modelled
+
+    def with_effects(self, **changes: Any) -> Self:
+        """The scene with values of `Effects` given for every bearing, without numbers of lost friction laws."""
+        bearings = [
+            replace(
+                mount,
+                effects=replace(mount.effects or Auto(), **changes),
+                bearing=bearing_for(mount.bearing, changes.get("friction")),
+            )
+            for mount in self.bearings
+        ]
         return replace(self, bearings=bearings)
 
     def beginning_like(self, others: Sequence[Self]) -> Self:

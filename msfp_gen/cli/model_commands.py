@@ -104,13 +104,27 @@ def equations(
     say(model.latex() if latex else str(model))
 
 
-@app.command(epilog="Example:\n\n\b\n  msfp-gen explain fenz-test2\n  msfp-gen explain scene.toml")
-def explain(scene: SceneName) -> None:
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen explain fenz-test2\n  msfp-gen explain scene.toml --effects",
+)
+def explain(
+    scene: SceneName,
+    effects: Annotated[
+        bool,
+        typer.Option("--effects", help="Run it with each effect changed alone: change of results, time and verdict."),
+    ] = False,
+) -> None:
     """Describe a scene: bearing, motion, top, or building; what is modelled and how it is solved."""
     from msfp_gen.scene.explain import explain as describe
     from msfp_gen.scene.file.source import load_scene
 
-    show(describe(load_scene(scene)))
+    system = load_scene(scene)
+    if not effects:
+        show(describe(system))
+        return
+    from msfp_gen.studies.accuracy.effect_by_effect import effect_by_effect
+
+    show(effect_by_effect(system, note).tables)
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen presets")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from math import log, pi, sqrt
 from typing import TYPE_CHECKING, Any
@@ -112,6 +113,16 @@ def check_bearing(law: Law | None, word: str, spin: str, bearing: Bearing) -> No
                     f"bearing.surfaces[{index}] (surface {index + 1}): the law of effects.friction = "
                     f"{law.word!r} {defect}"
                 )
+
+
+def bearing_for(bearing: Bearing, friction: str | None) -> Bearing:
+    """The bearing without the numbers that a built-in law, or constant friction, does not take; None: as it is."""
+    if friction is None:
+        return bearing
+    law = BUILT_IN.get(friction)
+    known = set() if law is None else {*law.parameters, *law.also_accepted}
+    gone: dict[str, Any] = dict.fromkeys(set(law_parameter_names()) - known)
+    return replace(bearing, surfaces=tuple(replace(surface, **gone) for surface in bearing.surfaces))
 
 
 def _check_takers(

@@ -14,7 +14,7 @@ from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.motions.time_grid import TIME_TOLERANCE
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection, select_effects
-from msfp_gen.scene.friction_parameters import check_bearing
+from msfp_gen.scene.friction_parameters import bearing_for, check_bearing
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.scene_fields import InitialState, Limits, SceneFields, Stop
 from msfp_gen.scene.solver import Solver
@@ -120,6 +120,16 @@ class Scene(SceneFields):
     def with_bearings(self, change: Callable[[Bearing, Law | None], Bearing]) -> Self:
         """The scene with its bearing changed. change: of a bearing and its friction law at the start."""
         return replace(self, bearing=change(self.bearing, self.law[1]))
+
+    @property
+    def every_effects(self) -> tuple[Effects, ...]:
+        """The effects at the start of the run, of the one bearing."""
+        return (self.modelled,)
+
+    def with_effects(self, **changes: Any) -> Self:
+        """The scene with values of `Effects` given, without numbers of a friction law that it loses."""
+        effects = replace(self.effects, **changes)
+        return replace(self, effects=effects, bearing=bearing_for(self.bearing, changes.get("friction")))
 
     def beginning_like(self, others: Sequence[Self]) -> Self:
         """The scene itself: a run takes in the effects that it needs, which `with_effects_of` gives to all."""

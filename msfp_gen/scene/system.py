@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene_fields import Limits
     from msfp_gen.scene.solver import Solver
     from msfp_gen.specification.friction_laws import Law
-    from msfp_gen.specification.layout import ModelSpec
+    from msfp_gen.specification.layout import Effects, ModelSpec
 
 Table = dict[str, Any]
 GROUP = "msfp_gen.systems"  # of entry points; the name of each is the `key` of its kind
@@ -72,6 +72,13 @@ class System(Protocol):
     def with_bearings(self, change: Callable[[Bearing, Law | None], Bearing]) -> Self:
         """It with every bearing changed."""
 
+    @property
+    def every_effects(self) -> tuple[Effects, ...]:
+        """Effects of the models with which the bearings start."""
+
+    def with_effects(self, **changes: Any) -> Self:
+        """It with values of `Effects` given for every bearing, without numbers of friction laws that it loses."""
+
     def beginning_like(self, others: Sequence[Self]) -> Self:
         """It with every effect with which any of `others` begins."""
 
@@ -115,6 +122,15 @@ class OtherSystem(ABC):
     def with_bearings(self, change: Callable[[Bearing, Law | None], Bearing]) -> Any:
         """It with every bearing changed. change: of a bearing and its friction law at the start. Raises InputError."""
         raise InputError("this system has no bearings that can be changed")
+
+    @property
+    def every_effects(self) -> tuple[Effects, ...]:
+        """Effects of the models with which the bearings start; () where the system gives none."""
+        return ()
+
+    def with_effects(self, **changes: Any) -> Any:
+        """It with values of `Effects` given for every bearing. Raises InputError."""
+        raise InputError("the effects of this system cannot be changed")
 
     def beginning_like(self, others: Sequence[Any]) -> Any:
         """It with every effect with which any of `others`, which differ in values alone, begins."""
