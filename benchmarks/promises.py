@@ -36,7 +36,15 @@ RESOLVED = 1e-7  # the same for presets, whose ringing is not damped
 TRUTH, CONFIRMED = 1e-8, 1e-7  # tolerances of the campaign: of the reference run, and of the one that confirms it
 LIMITS, BUDGET = (30.0, 15.0), 60.0  # [s] of wall time: of these two runs, and of the search for a requested error
 PROMISED = 0.005  # what `Auto` promises, of the friction force and of the largest sliding displacement
-OF_ACCURACY = {"vibration", "tolerance", "energy", "peak", "rattle", "seats"}  # notes of how far numbers are off
+OF_ACCURACY = {
+    "vibration",
+    "tolerance",
+    "energy",
+    "peak",
+    "rattle",
+    "seats",
+    "rows",
+}  # notes of how far numbers are off
 SEED, COUNT = 21, 30
 ROOT = Path(__file__).resolve().parents[1]
 

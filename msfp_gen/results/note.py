@@ -16,12 +16,12 @@ class Note:
 
     time [s]: of the first detection. kind: "rims", "uplift", "inertia", "heat", "law_speed", "law_load",
     "law_temperature", "plane", "jammed", "energy", "tolerance", "vibration", "damping", "creep", "peak", "rattle",
-    "seats", "footprint", "ringing", "gradient", "fidelity" or "value". surface: 1..n-1; 0: none. value: what the text
-    gives, of a monitor the one furthest beyond its limit: distance beyond the capacity [m], force [N], inertial over
-    normal force [-], temperature rise [K], slip velocity [m/s], temperature [degC], share of the energy or the force
-    [-], movement [m], distance of the normal force from the axis [m], number of landings, error over the derivative
-    [-], value of the scene. action: the effects with which the run continued; "": it continued unchanged, or ended.
-    bearing: of a building, from 1; 0: none.
+    "seats", "rows", "footprint", "ringing", "gradient", "fidelity" or "value". surface: 1..n-1; 0: none. value: what
+    the text gives, of a monitor the one furthest beyond its limit: distance beyond the capacity [m], force [N],
+    inertial over normal force [-], temperature rise [K], slip velocity [m/s], temperature [degC], share of the energy
+    or the force [-], movement [m], distance of the normal force from the axis [m], number of landings, error over the
+    derivative [-], value of the scene. action: the effects with which the run continued; "": it continued unchanged, or
+    ended. bearing: of a building, from 1; 0: none.
     """
 
     time: float
@@ -81,6 +81,7 @@ IMPORTANCE = (
         "tolerance",
         "rattle",
         "seats",
+        "rows",
         "damping",
         "inertia",
         "plane",

@@ -212,6 +212,7 @@ def _result(run: BearingRun, history: History) -> Result:
     scene, segments, parameters, last = run.scene, run.segments, run.parameters, run.segments[-1]
     counts = [{k: int(n) for k, n in segment.run.counts.items()} for segment in segments]
     total = Counters(**{name: sum(count[name] for count in counts) for name in counts[0]})
+    extremes = extremes_of(segments)
     events = tuple(event for s in segments for event in events_of(s.run, s.azimuth))
     return Result(
         scene=scene,
@@ -223,10 +224,10 @@ def _result(run: BearingRun, history: History) -> Result:
         provenance=provenance_of(scene.solver, ", then ".join(segment.model.spec.key for segment in segments))
         | {"build_seconds": f"{sum(segment.setup for segment in segments):.3g}"},
         notes=tuple(run.notes)
-        + history_notes(scene, last.model.effects, history, total.steps)
+        + history_notes(scene, last.model.effects, history, total.steps, extremes)
         + landing_notes(events)
         + (gradient_notes(scene, last.model.effects, events) if parameters else ()),
-        recorded_extremes=extremes_of(segments),
+        recorded_extremes=extremes,
         gradients=run_gradients(scene, last, parameters, run.energies, len(history.time), events)
         if parameters
         else None,

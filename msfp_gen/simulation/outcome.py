@@ -137,6 +137,7 @@ VIBRATION_LIMIT = 0.001  # estimated error by vibrations of a stuck mass, over t
 PHASE_ERROR = 0.0404  # phase by which a step h of TR-BDF2 is late, over (omega h)^3 (Hosea and Shampine 1996)
 UNEVEN = 2.0  # mean cube of the steps over the cube of their mean, where rows do not show the steps
 LARGEST_PHASE = 1.4  # error of the phase [rad] at which two vibrations differ as much as ones of any phase: sqrt(2)
+ROWS_LIMIT = 0.005  # peak force of rows less that at the ends of steps, over friction, likewise; as `Auto.error`
 REMEMBERED = 20.0  # sliding displacement after which a vibration is forgotten, over the sum of yield displacements
 CREEP_TIME = 10.0  # time stuck off the centre [s] after which creep is looked for
 LOADING = 1.0  # slip less elastic slip of a Bouc-Wen law on the way to |(Y, Z)| = 0.96, over d_y: artanh(Y) - Y
@@ -154,6 +155,8 @@ TEXTS = {
     "seats": "the bearing hardly slides: its {slid:.3g} m are the elastic part of friction, {value:.1%} of them the "
     "compression of contacts, which only a model with uplift tells apart; forces and displacements across the bearing "
     "do not change",
+    "rows": "the peak force of the rows is {value:.3g} N above the {stated:.4g} N at the ends of steps, {share:.1%} of "
+    "friction: rows between steps are interpolated; give a smaller solver.rtol, or leave out output_step",
     "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
     "give a smaller contact_damping",
     "creep": "the displacement that remains may be wrong by {value:.3g} m or more, by which surfaces moved while none "
@@ -169,8 +172,10 @@ def _note(kind: str, time: float, value: float, surface: int = 0, **more: float)
     return Note(float(time), kind, surface, float(value), text)
 
 
-def history_notes(scene: Scene, effects: Effects, history: History, steps: int) -> tuple[Note, ...]:
-    """The notes that follow from the rows of a whole run of so many steps; `effects`: of its last segment."""
+def history_notes(
+    scene: Scene, effects: Effects, history: History, steps: int, extremes: Extremes | None
+) -> tuple[Note, ...]:
+    """The notes of a whole run of so many steps, by its rows and its extremes; `effects`: of its last segment."""
     unseen = (Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity]),) if scene.fidelity in UNSEEN else ()
     stack = scene.fidelity != "equivalent"
     doubts = unseen + tuple(Note(0.0, "value", *doubt) for doubt in scene_doubts(scene) if stack)
@@ -178,6 +183,7 @@ def history_notes(scene: Scene, effects: Effects, history: History, steps: int) 
     physics += peak_notes(scene, effects, history)
     numerics = energy_notes(scene, history) + tolerance_notes(scene, effects, history)
     numerics += vibration_notes(scene, effects, history, steps) + seat_notes(scene, effects, history)
+    numerics += row_notes(scene, effects, history, extremes)
     return doubts + numerics + damping_notes(scene, history) + physics
 
 
@@ -245,6 +251,22 @@ def vibration_notes(scene: Scene, effects: Effects, history: History, steps: int
         return ()
     row = int(stuck.argmax())
     return (_note("vibration", history.time[row], error / peak, rate=turn / (2 * np.pi)),)
+
+
+def row_notes(scene: Scene, effects: Effects, history: History, extremes: Extremes | None) -> tuple[Note, ...]:
+    """A note where rows between the steps exceed the peak force at their ends by `ROWS_LIMIT` of friction.
+
+    They are interpolated, and a stiff spring of the top makes force of a micrometre. Quasi-static rows are solved for.
+    """
+    if extremes is None or scene.output_step is None or effects.sliders != "inertial":
+        return ()
+    friction = max(surface.friction for surface in scene.bearing.surfaces) * load_at_rest(scene)
+    across = np.hypot(history.top_force[:, 0], history.top_force[:, 1])
+    row, stated = int(across.argmax()), float(extremes.top_force[3])
+    excess = float(across[row]) - stated
+    if not excess > ROWS_LIMIT * friction > 0:
+        return ()
+    return (_note("rows", history.time[row], excess, share=excess / friction, stated=stated),)
 
 
 def seat_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
