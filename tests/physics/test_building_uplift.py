@@ -38,7 +38,7 @@ def test_contacts_that_stay_closed_store_no_more_than_the_spring_that_contains_t
         given = replace(scene(frame()), duration=0.5)
         return simulate(replace(given, bearings=[replace(mount, effects=effects) for mount in given.bearings]))
 
-    closed, seated = run(Effects(rims=False)), run(Effects(rims=False, uplift=True))
+    closed, seated = run(Effects()), run(Effects(uplift=True))
     assert not np.nan_to_num(seated.lift).any()
     assert seated.stored == pytest.approx(closed.stored, rel=1e-3)
 

@@ -48,7 +48,7 @@ def checked(found: dict[int, str]) -> Counter[str]:
 
 
 def test_damage_ends_in_one_line(tmp_path: Path) -> None:
-    assert checked(ends(bearing(tmp_path), 0, 40))["refused"] > 5
+    assert checked(ends(bearing(tmp_path), 0, 16))["refused"] > 2
 
 
 @pytest.mark.slow
