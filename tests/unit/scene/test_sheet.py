@@ -68,7 +68,7 @@ def test_appendix_of_the_report_follows_from_a_sheet(name: str) -> None:
 
 
 def test_arc_of_the_dish_is_the_capacity_of_the_report() -> None:
-    """Dishes of 229 and 89 mm, as the device has in its drawing, give the capacities of Table A.1 as printed."""
+    """Dishes of 9 and 3.5 inches round to the capacities of Table A.1; the report does not print their diameters."""
     sheet = Sheet(**{**FENZ, "capacity": None, "dish_diameter": [0.229, 0.089]})
     assert sheet.capacity is not None and np.round(np.array(sheet.capacity[:2]) * 1e3, 1).tolist() == [64.5, 21.5]
     again = Sheet(**{**FENZ, "capacity": sheet.capacity})
