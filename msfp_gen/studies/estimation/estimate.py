@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from shutil import rmtree
@@ -20,16 +21,16 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Choice, Quantity, check_fields, to_si
 from msfp_gen.common.tables import Table
 from msfp_gen.figures.style import COLOURS, FAINT, INK, headline, page
+from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.studies.assessment.rows import labelled
+from msfp_gen.studies.axes import SceneFactory
 from msfp_gen.studies.batch import pool_from
 from msfp_gen.studies.definition import Study, load_study
 from msfp_gen.studies.estimation.estimators import (
     EXACT,
     Moment,
-    exceeding,
     mean_of,
     optimal_runs,
-    quantile_of_t,
     work,
 )
 from msfp_gen.studies.estimation.source import Source, StudySource
@@ -43,6 +44,8 @@ STATISTICS = {
 }
 LEVELS = {"equivalent": 1, "rigid": 2, "massless": 2, "loose": 2}  # cheaper model -> rank, cheapest 1
 BOUNDS = {"most": "a lower bound", "least": "an upper bound", "": ""}  # `Quantity.side` -> of a run that ended early
+CHOICE = 32  # exact runs from which the cheap model is chosen
+PILOT = 500  # exact runs at least: what one draw in a hundred does is in 99 % of such samples
 ENOUGH = 0.25  # work over plain Monte Carlo below which no dearer model is tried
 NO_BENEFIT = 0.8  # work over plain Monte Carlo above which only exact runs are made
 ROUNDS = 8
@@ -50,6 +53,7 @@ GROWTH = 3.0  # exact runs of a round over the exact runs of the round before, a
 MARGIN = 0.9  # half width that the runs are planned for, over the target
 MOST = 200_000  # draws
 CHEAP = 8  # runs of the cheap model for each exact run, at least
+Z = 1.96  # quantile of the normal distribution for an interval of 95 %
 WIDTH, HEIGHT = 6.8, 4.6  # of the figure [inch]
 
 
@@ -59,7 +63,8 @@ class Question:
 
     quantity: a column of the study. statistic: a key of STATISTICS. threshold: of a probability [unit of the quantity].
     target: half the width of the interval of 95 %, over the value; for a probability not over the value. budget: core
-    time of all runs [s]. pilot: exact runs at the start. models: cheaper models to try; None: `estimate` chooses them.
+    time of all runs [s]. pilot: exact runs at least, unless the budget ends before. models: cheaper models to try;
+    None: `estimate` chooses them.
     seed: of the draws. side: how runs that ended early bound the quantity, as `Quantity.side`. Raises InputError.
     """
 
@@ -68,7 +73,7 @@ class Question:
     threshold: Annotated[float | None, Quantity("")] = None
     target: Annotated[float | None, Quantity("", above=0.0)] = None
     budget: Annotated[float | None, Quantity("s", above=0.0)] = None
-    pilot: Annotated[int, Quantity("", least=16, whole=True)] = 32
+    pilot: Annotated[int, Quantity("", least=16, whole=True)] = PILOT
     models: tuple[str, ...] | None = None
     seed: Annotated[int, Quantity("", least=0, whole=True)] = 0
     side: str = field(default="most", repr=False)
@@ -102,7 +107,7 @@ class Estimate:
         runs: model -> number of its runs.
         seconds: core time of all runs [s].
         plain_seconds: core time of plain Monte Carlo for this interval, from variance and cost of exact runs [s].
-        correlation: cheaper model -> correlation with the exact model, over the draws of the pilot [-].
+        correlation: cheaper model -> correlation with the exact model, over the draws by which it was chosen [-].
         costs: model -> core time of a run [s].
         trace: (seconds, half width) after each round.
         notes: what a reader must know, one line each.
@@ -195,8 +200,7 @@ def estimate(
         study, quantity=quantity, statistic=statistic, threshold=threshold, target=target, budget=budget,
         models=None if models is None else tuple(models), pilot=pilot, seed=seed,
     )  # fmt: skip
-    cheaper = ("equivalent", "massless" if "peak_sliding_1" in study.keep.known else "rigid")
-    levels = (EXACT, *(cheaper if question.models is None else question.models))
+    levels = (EXACT, *(cheaper_models(study) if question.models is None else question.models))
     assert question.quantity is not None
     existed = Path(folder).exists()
     try:
@@ -211,6 +215,16 @@ def estimate(
     return replace(result, unit=units[question.quantity] if question.threshold is None else "")
 
 
+def cheaper_models(study: Study) -> list[str]:
+    """The models of which the scene of a study has one, cheapest first."""
+    found = []
+    for level in ("equivalent", "massless" if "peak_sliding_1" in study.keep.known else "rigid"):
+        with suppress(InputError):
+            at_fidelity(SceneFactory(study.recipe).base, level)
+            found.append(level)
+    return found
+
+
 class _State:
     """The models of an estimate and the numbers of their runs: both run the same draws, from the first.
 
@@ -223,9 +237,10 @@ class _State:
     def __init__(self, source: Source, question: Question) -> None:
         self.source, self.question = source, question
         self.limit = min(MOST, source.population or MOST)
-        self.exact = min(question.pilot, self.limit)
+        self.exact = min(question.pilot, CHOICE, self.limit)
         self.cheap: str | None = None
         self.many = 0
+        self.rounds = 0  # planned after the pilot
         self.early: dict[str, int] = {}
 
     def outcomes(self, level: str, count: int) -> Array:
@@ -256,11 +271,24 @@ class _State:
     def moment(self) -> Moment:
         """The estimate from all runs so far; missing runs are computed."""
         exact = self.outcomes(EXACT, self.exact)
-        cheap = None if self.cheap is None else self.outcomes(self.cheap, self.many)
+        cheap = None if self.cheap is None else self.controls(self.cheap, self.many)
         population = self.source.population or np.inf
         if self.question.threshold is not None:
-            return exceeding(exact, cheap, self.question.threshold, population)
-        return mean_of(exact, None if cheap is None else _finite(cheap), population)
+            return mean_of((exact >= self.question.threshold).astype(float), cheap, population, largest=1.0)
+        return mean_of(exact, cheap, population)
+
+    def controls(self, level: str, count: int) -> Array:
+        """What a cheap model gives at the first draws, shape (count, k): its exceedances, or all its quantities."""
+        values, early = self.source.values(level, count)
+        self.early[level] = int(early.sum())
+        values = values.reshape(count, -1)
+        if self.question.threshold is not None:
+            return (values[:, :1] >= self.question.threshold).astype(float)
+        return np.stack([_finite(each) for each in values.T], axis=1)
+
+    def work(self, moment: Moment, level: str) -> float:
+        """Time by a cheap model for an interval, over the time of exact runs alone [-]."""
+        return work(moment.correlation, self.source.cost(level) / self.source.cost(EXACT))
 
     def plan(self, wanted: Array) -> bool:
         """Set the numbers of runs, shape (models,); whether there are more than before."""
@@ -280,16 +308,24 @@ def _finite(values: Array) -> Array:
 def estimated(source: Source, question: Question) -> Estimate:
     """The estimate of a statistic from a source of runs. Raises InputError."""
     state, notes = _State(source, question), []
-    correlation = _run_pilot(state)
-    if state.cheap is None:
-        notes.append("no cheaper model saves time here (correlation too low, or too dear): exact runs only")
+    correlation = _choose(state)
     trace: list[tuple[float, float]] = []
     for _ in range(ROUNDS):
         moment = state.moment()
+        if state.cheap is not None and state.work(moment, state.cheap) > NO_BENEFIT:
+            state.cheap = None
+            moment = state.moment()
         spent, runs = source.spent()
         trace.append((spent, moment.half))
         if not _plan_round(state, moment, spent):
             break
+    if state.cheap is None:
+        notes.append("no cheaper model saves time here (correlation too low, or too dear): exact runs only")
+    if question.threshold is None and state.exact < min(PILOT, source.population or PILOT):
+        notes.append(
+            f"the interval leaves out what fewer than one draw in {state.exact / 4:.0f} does, which {state.exact} "
+            f"exact runs may not show; {PILOT} show what one in a hundred does"
+        )
     value, half = moment.value, moment.half
     interval = value - half, value + half
     if question.threshold is not None:
@@ -306,39 +342,39 @@ def estimated(source: Source, question: Question) -> Estimate:
         elif count:
             word = (BOUNDS[question.side] if level == EXACT else "") or "what they reached"
             notes.append(f"{count} of {runs.get(level, count)} runs of {level} ended early; their value is {word}")
-    plain = max(value * (1 - value), 1e-12) if question.threshold is not None else moment.residual + moment.explained
-    seconds = costs[EXACT] * plain * quantile_of_t(np.inf) ** 2 / half**2 if half > 0 else spent
+    plain = max(value * (1 - value), 1e-12) if question.threshold is not None else moment.plain
+    seconds = costs[EXACT] * plain * Z**2 / half**2 if half > 0 else spent
     return Estimate(
         question.quantity or "", question.statistic, question.threshold, "", value, (interval[0], interval[1]), runs,
         spent, seconds, correlation, costs, trace=tuple(trace), notes=tuple(notes),
     )  # fmt: skip
 
 
-def _run_pilot(state: _State) -> dict[str, float]:
-    """Run the pilot and choose the cheap model; returns cheaper model -> correlation with the exact model."""
-    source, count = state.source, state.exact
+def _choose(state: _State) -> dict[str, float]:
+    """Choose the cheap model by the first draws, and plan the pilot; returns cheaper model -> correlation."""
+    source, question, count = state.source, state.question, state.exact
     exact = state.outcomes(EXACT, count)
     correlation: dict[str, float] = {}
     best = NO_BENEFIT
     for level in sorted(source.levels[1:], key=lambda name: LEVELS.get(name, 9)):
-        if best < ENOUGH and state.question.models is None:
+        if best < ENOUGH and question.models is None:
             break
-        correlation[level] = _correlation(exact, state.outcomes(level, count), state.question.threshold)
-        needed = work(correlation[level], source.cost(level) / source.cost(EXACT))
-        if needed < best:
+        moment = _moment_of_choice(exact, source.values(level, count)[0].reshape(count, -1), question.threshold)
+        correlation[level] = moment.correlation
+        if (needed := state.work(moment, level)) < best:
             best, state.cheap = needed, level
-    state.plan(np.array([count, 0]))
+    pilot = float(question.pilot)
+    if question.budget is not None:
+        pilot = min(pilot, question.budget / source.cost(EXACT))
+    state.plan(np.array([max(pilot, count), 0.0]))
     return correlation
 
 
-def _correlation(exact: Array, cheap: Array, threshold: float | None) -> float:
-    """The correlation of two models over the pilot; for a probability of the exceedances, where some runs exceed."""
-    first, second = _finite(exact), _finite(cheap)
+def _moment_of_choice(exact: Array, cheap: Array, threshold: float | None) -> Moment:
+    """The mean by the first draws; for a probability of the exceedances, where some runs exceed."""
     if threshold is not None and 2 <= (exact >= threshold).sum() <= len(exact) - 2:
-        first, second = ((values >= threshold).astype(float) for values in (exact, cheap))
-    if not (np.std(first) > 0 and np.std(second) > 0):
-        return 0.0
-    return max(float(np.corrcoef(first, second)[0, 1]), 0.0)
+        return mean_of((exact >= threshold).astype(float), (cheap[:, :1] >= threshold).astype(float), largest=0.0)
+    return mean_of(_finite(exact), np.stack([_finite(each) for each in cheap.T], axis=1), largest=0.0)
 
 
 class _BudgetError(InputError):
@@ -365,7 +401,7 @@ def _plan_round(state: _State, moment: Moment, spent: float) -> bool:
         if moment.unseen:  # such a variance falls with the square of the number of exact runs
             runs[0] = min(runs[0], exact * half / (MARGIN * target_half))
         needed = float(runs @ costs)
-        if question.budget is not None and needed > question.budget and exact <= question.pilot:
+        if question.budget is not None and needed > question.budget and not state.rounds:
             raise _BudgetError(
                 f"target = {question.target:g} needs about {needed:.3g} s, budget = {question.budget:g} s: give a "
                 f"target of {question.target * np.sqrt(needed / question.budget):.2g}, or the time"
@@ -375,6 +411,7 @@ def _plan_round(state: _State, moment: Moment, spent: float) -> bool:
             return False
         runs = optimal_runs(variances, costs, seconds=question.budget)
     runs *= min(1.0, GROWTH * exact / runs[0])
+    state.rounds += 1
     return state.plan(runs)
 
 

@@ -1,9 +1,9 @@
 """The mathematics of an estimate: the mean of an exact model from few of its runs and many of a cheap one.
 
-It is the regression estimator of double sampling (Cochran, *Sampling Techniques*, 3rd edition, 1977, section 12.6), in
-simulation a control variate with estimated coefficient (Lavenberg and Welch, *Management Science* 27 (1981), 322-335).
-The exact model runs the first n draws, the cheap one the first m of the same draws; its mean over all m corrects the
-mean over n by the slope of a regression line. A probability is the mean of the exceedances, 0 or 1, of both models.
+Control variates with estimated coefficients: Glasserman, *Monte Carlo Methods in Financial Engineering*, Springer 2004,
+section 4.1; in sampling the regression estimator (Cochran, *Sampling Techniques*, 3rd edition, 1977, section 12.6). The
+exact model runs the first n draws, the cheap one the first m of the same draws; what the cheap model gives over all m
+corrects the mean over n by a linear regression. A probability is the mean of the exceedances, 0 or 1, of both models.
 
 Numbers of runs are the optimum of two-level Monte Carlo: Peherstorfer, Willcox and Gunzburger, *SIAM Journal on
 Scientific Computing* 38 (2016), A3163-A3194.
@@ -20,6 +20,7 @@ from msfp_gen.common.arrays import Array
 
 EXACT = "exact"
 CONFIDENCE = 0.95
+UNSEEN = 2.0  # events more than were seen, in variances
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,8 @@ class Moment:
         variance: variance of the estimate.
         freedom: degrees of freedom of the variance.
         residual, explained: variance of a run of the exact and of the cheap model, for `optimal_runs`.
-        unseen: whether most of the variance is an allowance for what no run showed; such a variance falls with the
+        plain: variance of an exact run, without a cheap model.
+        unseen: whether most of the variance is the allowance for what no run showed; such a variance falls with the
             square of the number of exact runs.
     """
 
@@ -40,54 +42,48 @@ class Moment:
     freedom: float
     residual: float
     explained: float
+    plain: float
     unseen: bool = False
 
     @property
     def half(self) -> float:
         """Half the width of the interval of 95 %."""
-        return quantile_of_t(self.freedom) * sqrt(self.variance)
+        from scipy.special import stdtrit
+
+        return float(stdtrit(max(self.freedom, 1.0), (1 + CONFIDENCE) / 2)) * sqrt(self.variance)
+
+    @property
+    def correlation(self) -> float:
+        """Multiple correlation of the exact with the cheap model [-]."""
+        return sqrt(max(1 - self.residual / self.plain, 0.0)) if self.plain > 0 else 0.0
 
 
-def quantile_of_t(freedom: float) -> float:
-    """Half the width of an interval of 95 %, over the standard error: the quantile of Student's t distribution."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(max(freedom, 1.0), (1 + CONFIDENCE) / 2))
-
-
-def mean_of(exact: Array, cheap: Array | None = None, population: float = inf, added: float = 0.0) -> Moment:
+def mean_of(exact: Array, cheap: Array | None = None, population: float = inf, largest: float | None = None) -> Moment:
     """The mean of the exact model.
 
-    exact: values at the first n draws, shape (n,). cheap: at the first m >= n draws, shape (m,); None: without. What
-    the regression line adds at cheap values beyond those of the exact runs counts as an error: no run shows it.
-    population: number of draws that exist. added: to variances, over the number of runs.
+    exact: values at the first n draws, shape (n,). cheap: at the first m >= n draws, shape (m, k); None: without.
+    population: number of draws that exist. largest: deviation from the regression of a draw that no run showed; None:
+    the largest that was seen. Two such draws count in the variance, as in the intervals of Agresti and Coull (*The
+    American Statistician* 52 (1998), 119-126): of an event that no run shows the interval reaches to 2.8/n.
     """
-    n, value = len(exact), float(exact.mean())
-    if cheap is None or not np.ptp(cheap[:n]) > 0:
-        seen = float(exact.var(ddof=1))
-        residual = seen + added / n
-        return Moment(value, residual * max(1 / n - 1 / population, 0.0), n - 1, residual, 0.0, seen < added / n)
-    m, own = len(cheap), cheap[:n] - cheap[:n].mean()
-    squares = float(own @ own)
-    slope = float(own @ (exact - value)) / squares
-    shift = float(cheap.mean() - cheap[:n].mean())
-    errors = exact - value - slope * own
-    seen, explained = float(errors @ errors) / max(n - 2, 1), slope**2 * (float(cheap.var(ddof=1)) + added / m)
-    beyond = slope * float(np.abs(cheap - np.clip(cheap, cheap[:n].min(), cheap[:n].max())).mean())
-    residual = seen + added / n + n * beyond**2
-    variance = residual * max(1 / n - 1 / population + shift**2 / squares, 0.0)
-    variance += explained * max(1 / m - 1 / population, 0.0)
-    return Moment(value + slope * shift, variance, n - 2, residual, explained, seen < added / n)
-
-
-def exceeding(exact: Array, cheap: Array | None, threshold: float, population: float = inf) -> Moment:
-    """The probability that the exact value is at least a threshold; arguments as of `mean_of`.
-
-    Two events more than were seen count in the variances (Agresti and Coull, *The American Statistician* 52 (1998),
-    119-126): of an event that no run shows the interval reaches to 2.8/n.
-    """
-    over = None if cheap is None else (cheap >= threshold).astype(float)
-    return mean_of((exact >= threshold).astype(float), over, population, added=2.0)
+    n, mean = len(exact), float(exact.mean())
+    centred = np.zeros((n, 0)) if cheap is None else cheap[:n] - cheap[:n].mean(axis=0)
+    varied = np.ptp(centred, axis=0) > 0
+    own, k = centred[:, varied], int(varied.sum())
+    slope = np.linalg.lstsq(own, exact - mean, rcond=None)[0]
+    errors = exact - mean - own @ slope
+    seen = float(errors @ errors) / max(n - 1 - k, 1)
+    allowance = UNSEEN / n * (float(np.abs(errors).max()) if largest is None else largest) ** 2
+    residual, explained, shift = seen + allowance, 0.0, np.zeros(k)
+    variance = residual * max(1 / n - 1 / population, 0.0)
+    if cheap is not None and k:
+        m, every = len(cheap), cheap[:, varied]
+        shift = every.mean(axis=0) - cheap[:n, varied].mean(axis=0)
+        explained = float((every @ slope).var(ddof=1))
+        variance += residual * float(shift @ np.linalg.pinv(own.T @ own, hermitian=True) @ shift)
+        variance += explained * max(1 / m - 1 / population, 0.0)
+    plain = float(exact.var(ddof=1))
+    return Moment(mean + float(slope @ shift), variance, n - 1 - k, residual, explained, plain, seen < allowance)
 
 
 def work(correlation: float, cost: float) -> float:

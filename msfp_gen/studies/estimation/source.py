@@ -24,6 +24,7 @@ from msfp_gen.studies.run import STUDY_FILE, parts_in, readable_parts, run_on, s
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
+DISPLACEMENT = "peak_displacement"  # with it a regression follows forces that are no line of the cheap ones
 BLOCK = 1024  # draws that are made together
 CHUNKS = {EXACT: 4, "equivalent": 64}  # model -> runs of a part
 CHUNK = 8  # runs of a part of any other model
@@ -42,8 +43,8 @@ class Source(Protocol):
     def values(self, level: str, count: int) -> tuple[Array, Flags]:
         """The quantity at the first draws, shape (count,) [its unit], and which runs ended early, shape (count,).
 
-        Missing runs are computed. The quantity of a run that ended early is the value until then; it is infinite where
-        a run has no value.
+        A cheap model may give further quantities beside it, then shape (count, k). Missing runs are computed.
+        The quantity of a run that ended early is the value until then; it is infinite where a run has no value.
         """
 
     def cost(self, level: str) -> float:
@@ -105,7 +106,9 @@ class StudySource:
         check_quantity(study, quantity, levels)
         folders = {level: folder if level == EXACT else folder / level for level in levels}
         self._models = {
-            level: _Model(level_study(study, level, quantity), own_folder, quantity, self.draws, pool)
+            level: _Model(
+                level_study(study, level, quantity), own_folder, names_of(study, level, quantity), self.draws, pool
+            )
             for level, own_folder in folders.items()
         }
         self._progress = progress
@@ -129,8 +132,8 @@ class StudySource:
 class _Model:
     """The runs of one model at the first `count` draws, kept as a study in a folder."""
 
-    def __init__(self, study: Study, folder: Path, quantity: str, draws: Draws, pool: Pool) -> None:
-        self.study, self.folder, self.quantity, self.draws, self.pool = study, folder, quantity, draws, pool
+    def __init__(self, study: Study, folder: Path, names: Sequence[str], draws: Draws, pool: Pool) -> None:
+        self.study, self.folder, self.names, self.draws, self.pool = study, folder, names, draws, pool
         self.count = 0
         if (folder / STUDY_FILE).is_file():
             self.count = int(study_table(folder).get("accuracy", {}).get("draws", 0))
@@ -144,13 +147,14 @@ class _Model:
 
     def _run(self) -> None:
         run_on(self.pool, self._listed_study(), self.folder)
-        rows = read_study(self.folder, [self.quantity])
-        values = numbers(rows, self.quantity)
+        rows = read_study(self.folder, list(self.names))
+        values = np.stack([numbers(rows, name) for name in self.names], axis=1)
+        values = values[:, 0] if len(self.names) == 1 else values
         complete = np.asarray(rows["status"] == COMPLETE)
         if len(values) < self.count:
             raise RunError(f"{self.folder}: {self.count - len(values)} runs are missing; run the same command again")
         self._values = np.where(np.isnan(values), np.inf, values)
-        self._early = ~complete | np.isnan(values)
+        self._early = ~complete | np.isnan(values.reshape(len(values), -1)[:, 0])
 
     def _listed_study(self) -> Study:
         """The study whose rows are the runs."""
@@ -183,16 +187,23 @@ class _Model:
 
 
 def level_study(study: Study, level: str, quantity: str) -> Study:
-    """The study of one model: the exact model keeps all quantities of the study, any other this quantity alone."""
+    """The study of one model: the exact model keeps all quantities of the study, any other those of `names_of`."""
     chunk = CHUNKS.get(level, CHUNK)
     if level == EXACT:
         return replace(study, given_chunk=study.given_chunk or chunk)
     scene = {**study.recipe.scene, "fidelity": level}
     formulas = tuple((name, text) for name, text in study.keep.formulas if name == quantity)
-    keep = replace(study.keep, names=() if formulas else (quantity,), formulas=formulas)
+    names = [name for name in names_of(study, level, quantity) if name not in dict(formulas)]
+    keep = replace(study.keep, names=tuple(names), formulas=formulas)
     table = {key: value for key, value in study.table.items() if key not in ("keep", "quantities")}
     table |= {"scene": scene, "keep": list(keep.names), "quantities": dict(formulas)}
     return replace(study, recipe=replace(study.recipe, scene=scene), keep=keep, table=table, given_chunk=chunk)
+
+
+def names_of(study: Study, level: str, quantity: str) -> list[str]:
+    """The quantities that a model gives: the quantity, and of a cheap model the peak displacement beside it."""
+    second = level != EXACT and quantity != DISPLACEMENT and DISPLACEMENT in study.keep.known
+    return [quantity, DISPLACEMENT] if second else [quantity]
 
 
 def check_quantity(study: Study, quantity: str, levels: Sequence[str]) -> None:

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from scipy.stats import norm
+from scipy.stats import norm, t
 
 from msfp_gen import InputError
 from msfp_gen.studies import estimate, read_study
 from msfp_gen.studies.definition import example_text
-from msfp_gen.studies.estimation.estimate import Question, estimate_table, estimated, plot_estimate
-from msfp_gen.studies.estimation.estimators import exceeding, mean_of, optimal_runs, work
+from msfp_gen.studies.estimation.estimate import PILOT, Question, estimate_table, estimated, plot_estimate
+from msfp_gen.studies.estimation.estimators import mean_of, optimal_runs, work
 
 SPREAD, NOISE = 0.5, 0.1  # standard deviation of the logarithm, and share of it that the cheap model does not see
 
@@ -77,12 +77,24 @@ def test_the_estimate_is_the_regression_line_at_the_mean_of_the_cheap_model():
     cheap = rng.standard_normal(500)
     exact = 2.0 + 0.7 * cheap[:40] + 0.1 * rng.standard_normal(40)
     slope, intercept = np.polyfit(cheap[:40], exact, 1)
-    found = mean_of(exact, cheap)
+    found = mean_of(exact, cheap[:, None], largest=0.0)
     assert found.value == pytest.approx(intercept + slope * cheap.mean())
-    beyond = slope * np.abs(cheap - np.clip(cheap, cheap[:40].min(), cheap[:40].max())).mean()
-    assert found.residual == pytest.approx(np.sum((exact - intercept - slope * cheap[:40]) ** 2) / 38 + 40 * beyond**2)
+    assert found.residual == pytest.approx(np.sum((exact - intercept - slope * cheap[:40]) ** 2) / 38)
     assert found.explained == pytest.approx(slope**2 * cheap.var(ddof=1)) and found.freedom == 38
-    assert mean_of(exact).value == exact.mean() and mean_of(exact).variance == pytest.approx(exact.var(ddof=1) / 40)
+    alone = mean_of(exact, largest=0.0)
+    assert alone.value == exact.mean() and alone.variance == pytest.approx(exact.var(ddof=1) / 40)
+    assert alone.half == pytest.approx(np.diff(t.interval(0.95, 39, scale=exact.std(ddof=1) / np.sqrt(40)))[0] / 2)
+
+
+def test_two_controls_are_a_regression_on_both():
+    """A force that is no line of the cheap force is one of force and displacement; what never varies is no control."""
+    rng = np.random.default_rng(4)
+    force, displacement = rng.random((2, 4000))
+    cheap = np.stack([force, displacement, np.ones(4000)], axis=1)
+    found = mean_of(1.0 + (2 * force - 3 * displacement)[:50], cheap)
+    assert found.value == pytest.approx(1.0 + 2 * force.mean() - 3 * displacement.mean(), rel=1e-12)
+    assert found.correlation == pytest.approx(1.0) and found.freedom == 47
+    assert mean_of(1.0 + (2 * force - 3 * displacement)[:50], cheap[:, :1]).correlation < 0.8
 
 
 def test_the_variance_is_that_of_repetitions():
@@ -90,23 +102,102 @@ def test_the_variance_is_that_of_repetitions():
     rng, found = np.random.default_rng(3), []
     for _ in range(2000):
         hidden, other = rng.standard_normal((2, 600))
-        found.append(mean_of(np.exp(SPREAD * (hidden + NOISE * other))[:60], 1.1 * np.exp(0.45 * hidden)))
+        cheap = 1.1 * np.exp(0.45 * hidden)
+        found.append(mean_of(np.exp(SPREAD * (hidden + NOISE * other))[:60], cheap[:, None]))
     values = np.array([one.value for one in found])
-    stated = np.mean([one.variance for one in found])  # what lies beyond the exact runs counts as an error
+    stated = np.mean([one.variance for one in found])  # with two draws more of the largest deviation
     assert 0.9 * values.var() < stated < 1.6 * values.var()
     assert values.mean() == pytest.approx(np.exp(truth() / 2), abs=0.003)
 
 
 def test_an_event_that_no_run_shows_may_still_occur():
     """The rule of three: of 100 runs without an event the interval reaches to about 3/100."""
-    assert exceeding(np.zeros(100), None, 1.0).half == pytest.approx(0.028, abs=0.001)
+    assert mean_of(np.zeros(100), largest=1.0).half == pytest.approx(0.028, abs=0.001)
+
+
+def smooth(rng, count):
+    hidden, other = rng.standard_normal((2, count))
+    return np.exp(SPREAD * (hidden + NOISE * other)), 1.1 * np.exp(0.45 * hidden)
+
+
+def curved(rng, count):
+    hidden, other = rng.standard_normal((2, count))
+    return 2.0 + 0.5 * hidden + hidden**2 + 0.1 * other, hidden
+
+
+def jumping(rng, count):
+    """One draw in a hundred jumps by ten times the mean; the cheap model does not see it."""
+    hidden, other = rng.standard_normal((2, count))
+    return np.exp(0.3 * (hidden + 0.1 * other)) + 10 * (rng.random(count) < 0.01), np.exp(0.3 * hidden)
+
+
+def stiffening(rng, count):
+    """A rim at twice the median, met by one draw in 24, which the cheap model does not have."""
+    hidden, other = rng.standard_normal((2, count))
+    reached = np.exp(0.4 * (hidden + 0.1 * other))
+    return reached + 20 * np.maximum(reached - 2.0, 0.0), np.exp(0.4 * hidden)
+
+
+POPULATIONS = {"smooth": smooth, "curved": curved, "jumping": jumping, "stiffening": stiffening}
+LIMIT = {"smooth": 2.0, "curved": 6.0, "jumping": 1.8, "stiffening": 2.0}  # of a probability
+
+
+class Population(Lognormal):
+    """Draws of one of the populations."""
+
+    def __init__(self, draw, seed):
+        super().__init__(seed, cost=0.05)
+        exact, cheap = draw(np.random.default_rng([7, seed]), 60_000)
+        self._values = {"exact": exact, "equivalent": cheap}
+        self._early = np.zeros(len(exact), dtype=bool)
+
+
+@pytest.mark.parametrize("name", POPULATIONS)
+def test_intervals_of_a_pilot_hold_the_mean(name):
+    """Of 400 intervals of 95 % by the runs of a pilot, 92 to 98 % hold it."""
+    draw, held = POPULATIONS[name], 0
+    expected = draw(np.random.default_rng(0), 1_000_000)[0].mean()
+    for seed in range(400):
+        exact, cheap = draw(np.random.default_rng([7, seed]), 4000)
+        found = mean_of(exact[:PILOT], cheap[:, None])
+        held += abs(found.value - expected) <= found.half
+    assert 0.92 * 400 <= held <= 0.98 * 400
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("statistic", ["mean", "probability"])
+@pytest.mark.parametrize("name", POPULATIONS)
+def test_intervals_of_estimates_hold_the_truth(name, statistic):
+    """Of whole estimates, whose rounds end when the interval is narrow enough."""
+    draw, held = POPULATIONS[name], 0
+    values = draw(np.random.default_rng(0), 4_000_000)[0]
+    expected, threshold, target = values.mean(), None, 0.03
+    if statistic == "probability":
+        threshold, target = LIMIT[name], 0.01
+        expected = np.mean(values >= threshold)
+    for seed in range(400):
+        found = estimated(Population(draw, seed), Question("q", statistic, threshold, target=target))
+        held += found.interval[0] <= expected <= found.interval[1]
+    assert 0.92 * 400 <= held <= 0.98 * 400
+
+
+def test_a_jump_that_the_cheap_model_does_not_see_runs_plainly_and_says_so():
+    found = estimated(Population(jumping, 1), Question("q", target=0.05))
+    assert any("no cheaper model saves time" in note for note in found.notes)
+    assert found.value == pytest.approx(np.exp(0.045 * 1.01) + 0.1, abs=2 * found.half)
+
+
+def test_fewer_exact_runs_than_show_what_is_rare_are_stated():
+    few = estimated(Lognormal(), Question("q", target=0.1, pilot=40))
+    assert any("fewer than one draw in 10" in note for note in few.notes) and few.runs["exact"] < PILOT
+    many = estimated(Lognormal(), Question("q", target=0.1))
+    assert not many.notes and many.runs["exact"] == PILOT
 
 
 CASES = {
     "mean": ("mean", None, 0.03, lambda: np.exp(truth() / 2)),
     "probability": ("probability", 2.0, 0.02, lambda: norm.sf(np.log(2.0) / np.sqrt(truth()))),
 }
-RARE = float(np.exp(norm.isf(1e-3) * np.sqrt(truth())))  # what one draw in a thousand reaches
 
 
 @pytest.mark.parametrize("case", ["mean", pytest.param("probability", marks=pytest.mark.slow)])
@@ -119,19 +210,6 @@ def test_intervals_hold_the_truth(case):
         held += found.interval[0] <= value() <= found.interval[1]
         gains.append(found.plain_seconds / found.seconds)
     assert held >= 88 and np.median(gains) > 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("statistic", "threshold", "target", "value"), [
-        ("mean", None, 0.03, np.exp(truth() / 2)),
-        ("probability", 2.0, 0.02, norm.sf(np.log(2.0) / np.sqrt(truth()))),
-        ("probability", RARE, 1e-3, 1e-3),
-    ],
-)  # fmt: skip
-def test_coverage_over_many_repetitions(statistic, threshold, target, value):
-    every = (estimated(Lognormal(seed), Question("q", statistic, threshold, target=target)) for seed in range(400))
-    assert sum(found.interval[0] <= value <= found.interval[1] for found in every) >= 0.91 * 400
 
 
 class Overshooting(Lognormal):
@@ -211,7 +289,8 @@ def small_study(**changes):
 
 
 def test_an_estimate_of_a_study_is_kept_and_continued(tmp_path):
-    table = small_study(accuracy={"quantity": "peak_displacement", "target": "30 %", "pilot": 16})
+    accuracy = {"quantity": "peak_displacement", "target": "80 %", "pilot": 16, "models": ["equivalent"]}
+    table = small_study(accuracy=accuracy)
     first = estimate(table, tmp_path / "out", threads=True, workers=1)
     rows = read_study(tmp_path / "out")
     assert len(rows) == first.runs["exact"] >= 16 and "peak_force" in rows.columns
@@ -220,7 +299,7 @@ def test_an_estimate_of_a_study_is_kept_and_continued(tmp_path):
     again = estimate(table, tmp_path / "out", threads=True, workers=1)
     assert again.value == first.value and again.interval == first.interval
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("part-*")} == times
-    tighter = estimate(table, tmp_path / "out", target="6 %", threads=True, workers=1)
+    tighter = estimate(table, tmp_path / "out", target="30 %", threads=True, workers=1)
     assert tighter.runs["exact"] >= first.runs["exact"] and tighter.half < first.half
     assert len(estimate_table(tighter).rows) <= 10
     plot_estimate(tighter, tmp_path / "e.png")
@@ -251,7 +330,7 @@ def test_bad_input_is_one_line_and_writes_nothing(tmp_path, case):
 
 def test_a_target_beyond_the_budget_leaves_no_folder(tmp_path):
     """Its pilot is needed to know; a folder that was there before keeps its runs."""
-    goal = {"quantity": "peak_displacement", "target": "0.01 %", "pilot": 16, "budget": "1 s"}
+    goal = {"quantity": "peak_displacement", "target": "0.01 %", "pilot": 16, "budget": "1 s", "models": ["equivalent"]}
     with pytest.raises(InputError, match="budget = 1 s: give a target of") as error:
         estimate(small_study(accuracy=goal), tmp_path / "out", threads=True)
     assert "\n" not in str(error.value) and not (tmp_path / "out").exists()
