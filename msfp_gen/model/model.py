@@ -149,6 +149,16 @@ Triple = tuple[float, float, float]
 Rotation = tuple[ArrayLike, ArrayLike, ArrayLike]
 ZERO: Triple = (0.0, 0.0, 0.0)
 
+
+def stack_values(spec: ModelSpec, bearing: Bearing, top: Top | None, anchor: ArrayLike) -> tuple[Any, ...]:
+    """The arguments of a compiled stack, gravity and arrays; arguments and errors as of `Model.stack`."""
+    effects = spec.effects
+    if bearing.layout != spec.layout:
+        raise InputError(f"bearing.layout = {bearing.layout.name}: this model is for {spec.layout.name}")
+    check_bearing(effects.law, effects.friction, effects.spin, bearing)
+    return bearing.gravity, *bodies_and_surfaces(bearing, effects, top), top_values(top, anchor)
+
+
 _models: dict[ModelSpec, Model] = {}
 _models_lock = threading.Lock()
 _build_seconds = 0.0  # wall time that this process has spent on builds of models
@@ -179,7 +189,7 @@ class Model:
     @property
     def planar(self) -> bool:
         """Whether the model is planar."""
-        return self.effects.dimension == "planar"
+        return self.spec.planar
 
     def stack(self, bearing: Bearing, top: Top | None = None, anchor: ArrayLike = (0.0, 0.0)) -> Stack:
         """The compiled stack of one bearing and top.
@@ -187,11 +197,7 @@ class Model:
         anchor: horizontal position of the fixed end of the springs of a rig, shape (2,) [m]. Raises InputError where
         the bearing does not belong to this model.
         """
-        if bearing.layout != self.layout:
-            raise InputError(f"bearing.layout = {bearing.layout.name}: this model is for {self.layout.name}")
-        check_bearing(self.effects.law, self.effects.friction, self.effects.spin, bearing)
-        values = bodies_and_surfaces(bearing, self.effects, top)
-        stack: Stack = self.extension.Stack(bearing.gravity, *values, top_values(top, anchor))
+        stack: Stack = self.extension.Stack(*stack_values(self.spec, bearing, top, anchor))
         return stack
 
     def evaluate(

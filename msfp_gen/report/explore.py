@@ -22,7 +22,7 @@ from msfp_gen.jit.compiler import FLAGS, Log, Step, zig_program
 from msfp_gen.report.frames import asset, pieces, render, script_data, write_page
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import RigTop
-from msfp_gen.simulation.start import needs_settling, run_arguments
+from msfp_gen.simulation.start import first_arguments, needs_settling
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import Effects, ModelSpec
 
@@ -50,13 +50,11 @@ def problem_of(scene: Scene, title: str) -> Problem:
     fixed = fixed_scene(scene)
     effects = cast("Effects", fixed.effects)
     spec = ModelSpec(fixed.bearing.layout, effects)
-    arguments, azimuth = run_arguments(fixed, spec)
-    run, stack = arguments["run"], arguments["stack"]
+    (stack, run, options), azimuth = first_arguments(fixed, spec)
     motion, load = (
         {"knots": _packed(knots), "coefficients": _columns(coefficients)}
         for knots, coefficients in ((run[0], run[1]), (run[2], run[3]))
     )
-    options = arguments["options"]
     data = {
         "title": title,
         "name": fixed.name,

@@ -95,7 +95,7 @@ class _Inputs:
         self.top = contract.names(contract.TOP)
         self.seat = self.surfaces.index("seat_stiffness") if model.effects.uplift else None
         count = model.layout.surfaces
-        self.frame = Frame.of(scene, model, wrench_pieces(scene)[1])
+        self.frame = Frame.of(scene, model)
         self.arrays: dict[str, Any] = {
             "gravity": 0.0,
             "bodies": np.zeros((count + 1, len(self.bodies))),

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.model.compiled import Port, Run, bodies_and_surfaces, separations_at_rest, top_values
-from msfp_gen.model.model import Model
+from msfp_gen.model.model import Model, stack_values
 from msfp_gen.model.plane import (
     motion_in_plane,
     out_of_plane,
@@ -154,23 +153,35 @@ def transferred_heights(
 class Frame:
     """Base motion, load and top rotation of a scene in the frame of a model.
 
-    azimuth: of the E1 axis of the frame [rad]. wrench, rotation: coefficients of polynomials, shape (k, channels, 6).
+    azimuth: of the E1 axis of the frame [rad]. load_knots: times between the polynomials of the wrench, shape (k+1,)
+    [s]. wrench, rotation: coefficients of polynomials, shape (k, channels, 6).
     """
 
     azimuth: float
     motion: Motion
+    load_knots: Array
     wrench: Array
     rotation: Array | None
 
     @classmethod
-    def of(cls, scene: Scene, model: Model, wrench: Array) -> Frame:
+    def of(cls, scene: Scene, model: Model | ModelSpec) -> Frame:
         """The frame of a model: E1 of a planar model lies in the vertical plane of the scene."""
+        knots, wrench = wrench_pieces(scene)
         rotation = None if scene.top_rotation is None else scene.top_rotation.coefficients
         azimuth = scene_plane(scene)[0] if model.planar else 0.0
         if not azimuth:
-            return cls(0.0, scene.motion, wrench, rotation)
+            return cls(0.0, scene.motion, knots, wrench, rotation)
         planar_rotation = None if rotation is None else tilt_pieces(rotation, azimuth)
-        return cls(azimuth, motion_in_plane(scene.motion, azimuth), wrench_in_plane(wrench, azimuth), planar_rotation)
+        motion, wrench = motion_in_plane(scene.motion, azimuth), wrench_in_plane(wrench, azimuth)
+        return cls(azimuth, motion, knots, wrench, planar_rotation)
+
+
+class RunArguments(NamedTuple):
+    """Arguments of a compiled run: those of its stack, its arrays by position, and by name."""
+
+    stack: tuple[Any, ...]
+    arrays: tuple[Any, ...]
+    options: dict[str, Any]
 
 
 def start_run(
@@ -181,67 +192,65 @@ def start_run(
     end: time at which the run ends [s]. at: state of the segment before; None: the initial state of the scene. stops:
     the monitors that stop the run; the others only write notes.
     """
-    solver, stop = scene.solver, scene.stop
-    load_knots, wrench = wrench_pieces(scene)
-    frame = Frame.of(scene, model, wrench)
+    frame = Frame.of(scene, model)
     if at is None:
-        q, v, f = _initial_state(scene, model, frame)
+        state = _initial_state(scene, model, frame)
     else:
-        q, v, f = transferred_state(scene.bearing, scene.top, model, at)
-    stack = model.stack(scene.bearing, scene.top, anchor=frame.motion.displacement(0.0)[:2])
-    grid = time_grid(scene)
-    options: dict[str, Any] = {}
-    if frame.rotation is not None and scene.top_rotation is not None:
-        support = snapped(*_support_rotation(scene, frame.rotation), grid.stops)
-        options["support_knots"], options["support_coefficients"] = support
+        state = transferred_state(scene.bearing, scene.top, model, at)
+    options = monitor_options(scene, model.effects, selection, stops)
     if at is not None:
         becomes_spatial = at.planar and not model.planar
         origin, options["foot"] = transferred_heights(scene.bearing, scene.top, model, at, first_load(scene))
         origin = out_of_plane(origin, at.azimuth, "vector") if becomes_spatial else origin
         options |= {"origin": np.ascontiguousarray(origin), "monitor_heat": at.monitor_heat, "start_time": at.time}
+        options["first_step"] = 0.0
         if (memory := at.memory_of(model.effects.law)) is not None:
             options["memory"] = memory
-    run: Run = model.extension.Run(
-        stack,
-        *snapped(frame.motion.knots, frame.motion.coefficients, grid.stops),
-        *snapped(load_knots, frame.wrench, grid.stops),
-        grid.jumps,
-        q,
-        v,
-        f,
-        method=solver.method,
-        rtol=solver.rtol,
-        atol_angle=solver.angle_tolerance,
-        stops=grid.stops,
-        span_ends=grid.ends,
-        span_steps=grid.steps,
-        first_step=(solver.first_step or 0.0) if at is None else 0.0,
-        max_steps=float(solver.max_steps),
-        duration=end,
-        output_step=scene.output_step or 0.0,
-        stop_displacement=(stop.displacement or 0.0) if stop else 0.0,
-        stop_all_rims=bool(stop and stop.all_rims),
-        sampled=scene.motion.sampled,
-        quasistatic=quasistatic(scene, model.effects),
-        **monitor_options(scene, model.effects, selection, stops),
-        **options,
-    )
+    given = run_arguments(scene, model.spec, frame, state, end)
+    run: Run = model.extension.Run(model.extension.Stack(*given.stack), *given.arrays, **given.options | options)
     return run, frame.azimuth
 
 
-def run_arguments(scene: Scene, spec: ModelSpec) -> tuple[dict[str, Any], float]:
-    """The arguments of the compiled run of a scene, and the azimuth of its frame [rad]; nothing is compiled."""
-    arguments: dict[str, Any] = {}
+def first_arguments(scene: Scene, spec: ModelSpec) -> tuple[RunArguments, float]:
+    """The arguments with which a model without uplift starts, and the azimuth of its frame [rad]; nothing is built."""
+    frame = Frame.of(scene, spec)
+    given = run_arguments(scene, spec, frame, given_state(scene, spec, frame), scene.end)
+    monitors = monitor_options(scene, spec.effects, scene.effect_selection, ())
+    return given._replace(options=given.options | monitors), frame.azimuth
 
-    def stack(*values: Any) -> tuple[Any, ...]:
-        return values
 
-    def run(values: Any, *positional: Any, **options: Any) -> None:
-        arguments.update(stack=values, run=positional, options=options)
-
-    model = Model(spec, cast("Any", SimpleNamespace(Stack=stack, Run=run)), cast("Any", None))
-    _, azimuth = start_run(scene, model, scene.effect_selection, scene.end, None, ())
-    return arguments, azimuth
+def run_arguments(
+    scene: Scene, spec: ModelSpec, frame: Frame, state: tuple[Array, Array, Array], end: float
+) -> RunArguments:
+    """The arguments of a compiled run from a state, without monitors. end: as of `start_run`."""
+    solver, stop, grid = scene.solver, scene.stop, time_grid(scene)
+    anchor = frame.motion.displacement(0.0)[:2]
+    arrays = (
+        *snapped(frame.motion.knots, frame.motion.coefficients, grid.stops),
+        *snapped(frame.load_knots, frame.wrench, grid.stops),
+        grid.jumps,
+        *state,
+    )
+    options: dict[str, Any] = {
+        "method": solver.method,
+        "rtol": solver.rtol,
+        "atol_angle": solver.angle_tolerance,
+        "stops": grid.stops,
+        "span_ends": grid.ends,
+        "span_steps": grid.steps,
+        "first_step": solver.first_step or 0.0,
+        "max_steps": float(solver.max_steps),
+        "duration": end,
+        "output_step": scene.output_step or 0.0,
+        "stop_displacement": (stop.displacement or 0.0) if stop else 0.0,
+        "stop_all_rims": bool(stop and stop.all_rims),
+        "sampled": scene.motion.sampled,
+        "quasistatic": quasistatic(scene, spec.effects),
+    }
+    if frame.rotation is not None and scene.top_rotation is not None:
+        support = snapped(*_support_rotation(scene, frame.rotation), grid.stops)
+        options["support_knots"], options["support_coefficients"] = support
+    return RunArguments(stack_values(spec, scene.bearing, scene.top, anchor), arrays, options)
 
 
 def wrench_pieces(scene: Scene) -> tuple[Array, Array]:
@@ -302,7 +311,7 @@ def values_at_start(coefficients: Array) -> Array:
     return np.ascontiguousarray(derivatives(0.0) @ coefficients[0].T)
 
 
-def given_state(scene: Scene, model: Model, frame: Frame) -> tuple[Array, Array, Array]:
+def given_state(scene: Scene, model: Model | ModelSpec, frame: Frame) -> tuple[Array, Array, Array]:
     """Angles, rates and friction state at the start, without separations, shape (n-1, k) each [rad], [rad/s], [-]."""
     count, state = scene.bearing.layout.surfaces, scene.initial_state
     q, v, f = (

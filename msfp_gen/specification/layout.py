@@ -258,6 +258,11 @@ class ModelSpec:
     gradients: bool = False
 
     @property
+    def planar(self) -> bool:
+        """Whether the model is planar."""
+        return self.effects.dimension == "planar"
+
+    @property
     def key(self) -> str:
         """Unique name of the model, such as `5_2_2-spatial-locked-inertial-rims-report-constant`."""
         name = self.layout.name

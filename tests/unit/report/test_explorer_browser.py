@@ -21,7 +21,7 @@ from msfp_gen.report.explore import (
     write_explorer,
 )
 from msfp_gen.results.loops import REVERSAL, closed_cycles, effective_properties, turning_points
-from msfp_gen.simulation.start import run_arguments
+from msfp_gen.simulation.start import first_arguments
 from tests.support.explorer_page import CHROMIUM, DRIVER, SLIDE, act, choose_preset, explorer_in_browser
 
 pytestmark = [
@@ -102,7 +102,7 @@ def exchanged(browser):
 
 def run_in_python(numbers, problem: Problem) -> Any:
     """The compiled run of Python with the input of a page, in the order of explorer.c."""
-    given, _ = run_arguments(problem.scene, problem.spec)
+    given, _ = first_arguments(problem.scene, problem.spec)
     extension = build_model(problem.spec.layout, problem.spec.effects).extension
     at = 0
 
@@ -113,8 +113,8 @@ def run_in_python(numbers, problem: Problem) -> Any:
 
     gravity, method, *options = take(12)
     pieces, loads, jumps, stops, spans = map(int, take(5))
-    tables = [take(np.size(table), np.shape(table)) for table in given["stack"][1:4]]
-    state = [take(np.size(value), np.shape(value)) for value in given["run"][5:8]]
+    tables = [take(np.size(table), np.shape(table)) for table in given.stack[1:4]]
+    state = [take(np.size(value), np.shape(value)) for value in given.arrays[5:8]]
     motion = take(pieces + 1), take(36 * pieces, (-1, 6, 6))
     load = take(loads + 1), take(36 * loads, (-1, 6, 6))
     names = ("rtol", "atol_angle", "first_step", "max_steps", "duration", "output_step", "stop_displacement",
@@ -122,10 +122,10 @@ def run_in_python(numbers, problem: Problem) -> Any:
     named = dict(zip(names, options, strict=True))
     named |= {name: bool(named[name]) for name in names[-3:]}
     times = {"jumps": take(jumps), "stops": take(stops), "span_ends": take(spans), "span_steps": take(spans)}
-    assert at == len(numbers) and int(method) == extension.METHODS[given["options"]["method"]]
+    assert at == len(numbers) and int(method) == extension.METHODS[given.options["method"]]
     run = extension.Run(
         extension.Stack(gravity, *tables), *motion, *load, times.pop("jumps"), *state,
-        method=given["options"]["method"], **named, **times,
+        method=given.options["method"], **named, **times,
     )  # fmt: skip
     while run.advance():
         pass

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -38,6 +37,7 @@ from msfp_gen.scene.parameters import changed_parameters, parameters_of
 from msfp_gen.simulation.bearing_run import BearingRun
 from msfp_gen.simulation.gradients import RESOLVED_SHARE, measured_errors, start_gradients, with_gradient_errors
 from msfp_gen.simulation.start import start_slopes, state_at_rest
+from msfp_gen.specification.layout import ModelSpec
 
 PATHS = ("bearing.surfaces[*].friction", "top.axial_load", "motion.scale")
 
@@ -204,7 +204,7 @@ def test_every_value_of_bearing_and_top_is_differentiated(layout: tuple[int, int
     fields = ["mass", "inertia[*]", "height", "rotational_stiffness", "rotational_damping", "vertical_stiffness",
               "vertical_damping"]  # fmt: skip
     parameters = parameters_of(scene, [*paths, *(f"top.{name}" for name in fields)])
-    model: Any = SimpleNamespace(layout=bearing.layout, effects=effects, planar=False)
+    model: Any = ModelSpec(bearing.layout, effects)
     if uplift:  # its separations at the start follow from its equations
         model = build_model(bearing.layout, effects)
     seeds: Any = Seeds()
