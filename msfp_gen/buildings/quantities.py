@@ -35,7 +35,7 @@ QUANTITIES = _RUN | {
     "bearing_uplift_height": Quantity("m", "bearings.*.uplift.height", "most", of_parts=True),
     "bearing_uplift_duration": Quantity("s", "bearings.*.uplift.duration", "most", of_parts=True),
     "secant_period": Quantity("s", "secant_period", characterised=True),
-    "capacity_left": Quantity("m", "capacity_left", "least", characterised=True),
+    "capacity_left": Quantity("m", "capacity_left", "least", characterised=True, where="capacity_left_at"),
 }
 
 

@@ -230,15 +230,16 @@ class BearingDemand:
     """Demand on one bearing.
 
     number: from 1. name: of the bearing. peak_displacement: horizontal [m]. gaps: least of each surface, bottom first
-    [m]. displacement_used: peak_displacement over the displacement at which all rims are met [-]. minimum_load_ratio,
-    maximum_load_ratio: axial force over the load at rest [-]. residual_displacement: [m]; None
-    where the bearing still moves when the run ends. dissipated: energy at the end [J].
+    [m]; gap_shares: the same over its capacity [-]. displacement_used: peak_displacement over the displacement at which
+    all rims are met [-]. minimum_load_ratio, maximum_load_ratio: axial force over the load at rest [-].
+    residual_displacement: [m]; None where the bearing still moves when the run ends. dissipated: energy at the end [J].
     """
 
     number: int
     name: str
     peak_displacement: float
     gaps: tuple[float, ...]
+    gap_shares: tuple[float, ...]
     displacement_used: float
     minimum_load_ratio: float
     maximum_load_ratio: float
@@ -249,6 +250,13 @@ class BearingDemand:
     def capacity_left(self) -> float:
         """Capacity less sliding, the least of its surfaces [m]."""
         return min(self.gaps)
+
+    @property
+    def capacity_left_at(self) -> str:
+        """The bearing, the surface with the least capacity left, and its share of its capacity."""
+        surface = int(np.argmin(self.gaps))
+        name = f" {self.name}" if self.name else ""
+        return f"bearing {self.number}{name}, surface {surface + 1}: {100 * self.gap_shares[surface]:.3g} %"
 
 
 @dataclass(frozen=True, repr=False)
@@ -295,6 +303,7 @@ class BuildingCharacterisation(Characterisation):
                     bearing["name"],
                     bearing["peak_displacement"]["radial"],
                     tuple(bearing["minimum_gap"]),
+                    tuple(1.0 - used for used in bearing["capacity_used"]),
                     bearing["displacement_used"],
                     bearing["minimum_load_ratio"],
                     bearing["maximum_load_ratio"],
@@ -318,7 +327,16 @@ class BuildingCharacterisation(Characterisation):
     @property
     def capacity_left(self) -> float:
         """Capacity less sliding, the least of all surfaces of all bearings [m]."""
-        return min(bearing.capacity_left for bearing in self.bearings)
+        return self._tightest.capacity_left
+
+    @property
+    def capacity_left_at(self) -> str:
+        """The bearing and surface of `capacity_left`, and its share of the capacity of this surface."""
+        return self._tightest.capacity_left_at
+
+    @property
+    def _tightest(self) -> BearingDemand:
+        return min(self.bearings, key=lambda bearing: bearing.capacity_left)
 
     def demand_table(self) -> Table:
         """Table of the demands on the bearings."""

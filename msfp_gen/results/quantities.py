@@ -20,6 +20,7 @@ class Quantity(NamedTuple):
     defined only if the run ends at rest. of_parts: whether it is of parts of a building, which suites compare and
     bounds do not. kept: whether a study keeps it where its file names no quantities. extreme: whether it is the largest
     or the least value over the run; None: as `governs`. words: in tables and figures, in place of those of the column.
+    where: attribute of the characterisation that names the place of the value, and its share of what is allowed there.
     """
 
     unit: str
@@ -31,6 +32,7 @@ class Quantity(NamedTuple):
     kept: bool = False
     extreme: Side | None = None
     words: str = ""
+    where: str = ""
 
     @property
     def side(self) -> Side:

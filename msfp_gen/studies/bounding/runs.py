@@ -76,6 +76,10 @@ class Case:
             return None
         return source.value(self.result.summary, self.characterisation)  # type: ignore[no-any-return]
 
+    def place(self, source: Source) -> str:
+        """Where the value of a quantity is, and its share of what is allowed there; "" where it names no place."""
+        return str(getattr(self.characterisation, source.quantity.where or "_", ""))
+
     @property
     def stopped_at(self) -> float | None:
         """Time at which the run met the stop condition of its scene [s]; None if it did not."""
@@ -120,6 +124,13 @@ class Bounds:
         """Quantity -> case -> value [SI]; None where the run failed or the quantity is undefined."""
         return {name: {case.name: case.value(source) for case in self.cases} for name, source in self.compared.items()}
 
+    def places(self) -> dict[str, dict[str, str]]:
+        """Quantity -> case -> where its value is, of those that name a place in some case."""
+        places = {
+            name: {case.name: case.place(source) for case in self.cases} for name, source in self.compared.items()
+        }
+        return {name: texts for name, texts in places.items() if any(texts.values())}
+
     def undefined(self) -> dict[str, str]:
         """Quantity -> cases without a value and the reason, where it is known, as text."""
         reasons = {
@@ -155,6 +166,7 @@ class Bounds:
         return {
             "factors": {**{name: getattr(self.table, name) for name in fields}, "lambdas": self.lambdas},
             "quantities": self.quantities(),
+            "places": self.places(),
             "governing": self.governing(),
             "undefined": self.undefined(),
             "cases": {
@@ -406,13 +418,15 @@ def _lambda_table(bounds: Bounds) -> Table:
 
 
 def _quantity_table(bounds: Bounds) -> Table:
-    sources, governing = bounds.compared, bounds.governing()
+    sources, governing, places = bounds.compared, bounds.governing(), bounds.places()
     rows = []
     for name, values in bounds.quantities().items():
         if any(value is not None for value in values.values()):
             unit, scale = shown_as(sources[name].quantity.unit)
             cells = ["-" if (value := values[case]) is None else f"{value * scale:.4g}" for case in CASES]
             rows.append((f"{sources[name].words(name)} [{unit}]", *cells, governing.get(name, "")))
+        if texts := places.get(name):
+            rows.append((f"{sources[name].words(name)} is of", *(texts[case] or "-" for case in CASES), ""))
     return Table("results; properties of cycles are their means", ("", *CASES, "governs"), rows)
 
 

@@ -28,6 +28,8 @@ from msfp_gen.results.quantities import quantities
 from msfp_gen.results.result import load_result
 from msfp_gen.results.summary import summary_of_bearing
 from msfp_gen.scene.fidelity import Backbone, at_fidelity
+from msfp_gen.studies.bounding import CASES, Bounds, load_factors
+from msfp_gen.studies.bounding.runs import Case, _quantity_table
 
 
 def test_the_note_of_a_cheaper_model_is_read_from_the_file(tmp_path: Path):
@@ -367,3 +369,20 @@ def test_a_bearing_that_lifts_has_no_tension():
     assert dict(lifted.main_results())["N over N at rest"].startswith("0.00 (lifts) to ")
     texts = [row[lifted.part_tables()[-1].columns.index("N / N at rest")] for row in lifted.part_tables()[-1].rows]
     assert texts[1].startswith("0.00 (lifts) ... ") and "lifts" not in texts[0]
+
+
+def test_bounds_name_the_bearing_and_surface_with_the_least_capacity_left():
+    """And the share of its capacity, by the rows of every bearing and surface."""
+    result = pushed()
+    cases = tuple(Case(name, result.scene, result, result.characterise()) for name in CASES)
+    bounds = Bounds(load_factors("asce7"), {}, cases)
+    left = np.array([one.extremes.gap for one in result.bearings])
+    bearing, surface = np.unravel_index(left.argmin(), left.shape)
+    share = left[bearing, surface] / result.bearings[bearing].bearing.surfaces[surface].capacity
+    place = bounds.places()["capacity_left"]["lower"]
+    name = result.scene.bearings[bearing].name
+    assert place == f"bearing {bearing + 1}{f' {name}' if name else ''}, surface {surface + 1}: {100 * share:.3g} %"
+    assert bounds.quantities()["capacity_left"]["lower"] == left.min()
+    rows = {row[0]: row[1:] for row in _quantity_table(bounds).rows}
+    assert rows["capacity left is of"] == (place, place, place, "")
+    assert bounds.as_dict()["places"] == {"capacity_left": dict.fromkeys(CASES, place)}
