@@ -169,6 +169,7 @@ class ErrorTarget:
 
 
 DEMO = ("ridgecrest-ccc", "fenz-test5")
+DEMO_TOLERANCES = (1e-2, 1e-3, 3e-4, 1e-4)  # of the first scene, whose own one is the third
 
 app = typer.Typer()
 
@@ -230,15 +231,20 @@ def demo(
         "out"
     ),
 ) -> None:
-    """Run an earthquake and a laboratory test; write figures and data."""
+    """Run an earthquake and a laboratory test; write figures and data, and what accuracy costs."""
     from msfp_gen.common.output import make_folder
     from msfp_gen.scene.file.source import load_scene
+    from msfp_gen.studies.accuracy.study import cost_table, draw_summary, work_precision
 
     scenes = [load_scene(name) for name in DEMO]
     make_folder(output, "--output")
     for name, scene in zip(DEMO, scenes, strict=True):
         written = _run(scene, output / f"{name}.nc", output / f"{name}.png")
         say("\n".join(["", *(f"wrote {path}" for path in written), ""]))
+    study = work_precision(scenes[0], methods=["implicit"], tolerances=DEMO_TOLERANCES)
+    show([cost_table(study)])
+    draw_summary(study, output / "accuracy.png")
+    say(f"\nwrote {output / 'accuracy.png'}")
 
 
 def _with_options(scene: System, duration: float | None, **solver: Any) -> System:

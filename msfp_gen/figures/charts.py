@@ -180,6 +180,7 @@ def plot_work_precision(
     *,
     errors: Mapping[str, str] | None = None,
     floors: Mapping[str, Mapping[str, float]] | None = None,
+    marks: Mapping[str, Mapping[str, float]] | None = None,
     title: str = "Work and precision",
 ) -> Figure:
     """Error over cost of several methods, on logarithmic axes, with one row of panels for each kind of error.
@@ -193,6 +194,7 @@ def plot_work_precision(
         errors: column -> label of the errors; None: every column that is neither cost nor flag.
         floors: label -> column -> error, drawn as a line below which errors are not known, such as the difference of
             two references.
+        marks: label -> column -> value, of a run that is marked and named, such as the default.
         title: of the figure.
 
     Raises:
@@ -214,12 +216,21 @@ def plot_work_precision(
         for row, (error, label) in zip(grid, named.items(), strict=True):
             for axes, cost in zip(row, costs, strict=True):
                 _draw_panel(axes, columns, error, cost, floors or {})
+                _mark(axes, {label: (at.get(cost), at.get(error)) for label, at in (marks or {}).items()})
             row[0].set_ylabel(f"{label}, relative")
         for axes, cost in zip(grid[-1], costs, strict=True):
             axes.set_xlabel(COSTS[cost])
             _whole_decades(axes, [column[cost] for column in columns.values() if cost in column])
         _legend(figure, columns)
     return figure
+
+
+def _mark(axes: Axes, marks: Mapping[str, tuple[float | None, float | None]]) -> None:
+    """Name runs by their cost and error, where both are known."""
+    for label, (cost, error) in marks.items():
+        if cost is not None and error is not None:
+            axes.plot([cost], [error], marker="o", markersize=13, fillstyle="none", color=INK, linestyle="none")
+            axes.annotate(label, (cost, error), xytext=(10, 8), textcoords="offset points", color=INK, bbox=BLANK)
 
 
 def _checked(table: Table) -> dict[str, dict[str, Array]]:

@@ -15,6 +15,7 @@ from msfp_gen.cli import main
 from msfp_gen.cli.console import Progress
 from msfp_gen.cli.run_commands import DEMO
 from msfp_gen.common.errors import CompileError, RunError
+from msfp_gen.common.tables import Table
 from msfp_gen.jit.build import BuildInfo
 from msfp_gen.results.result import load_result
 
@@ -304,12 +305,20 @@ def test_doctor_fails_when_something_is_missing(capsys, monkeypatch):
     assert main(["doctor"]) == 0
 
 
-def test_demo_writes_figures_and_data(capsys, simulated, tmp_path):
+def test_demo_writes_figures_and_data(capsys, simulated, monkeypatch, tmp_path):
+    asked = []
+    drawn = "msfp_gen.studies.accuracy.study."
+    monkeypatch.setattr(drawn + "work_precision", lambda scene, **options: asked.append((scene, options["tolerances"])))
+    monkeypatch.setattr(drawn + "cost_table", lambda _: Table("what accuracy costs", (), [("1e-3", "0.1 %")]))
+    monkeypatch.setattr(drawn + "draw_summary", lambda _, path: path.write_bytes(b"drawn"))
     folder = tmp_path / "new" / "out"
     assert main(["demo", "-o", str(folder)]) == 0
     names = sorted(path.name for path in folder.iterdir())
-    assert names == sorted(f"{name}{suffix}" for name in DEMO for suffix in (".nc", ".png"))
+    assert names == sorted(["accuracy.png", *(f"{name}{suffix}" for name in DEMO for suffix in (".nc", ".png"))])
+    ((scene, tolerances),) = asked
+    assert scene.name == DEMO[0] and scene.solver.rtol in tolerances and len(tolerances) == 4
     out = capsys.readouterr().out
+    assert "what accuracy costs" in out
     assert all(f"wrote {folder / name}" in out for name in names)
     assert [scene.name for scene in simulated] == list(DEMO)
 

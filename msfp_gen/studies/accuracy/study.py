@@ -434,8 +434,66 @@ def draw(study: Study, path: str | Path) -> None:
     plot_work_precision(figure_table(study), path, errors=ERRORS, floors=floors, title=title)
 
 
+def default_point(study: Study) -> Point | None:
+    """The run of the scene's own method and tolerance; None where it is not in the study, or did not finish."""
+    solver = study.scene.solver
+    own = "as it stands" if study.kind == "model-error" else solver.method
+    points = [one for one in study.of(own) if one.trial.rtol == solver.rtol and one.errors is not None]
+    return points[0] if points else None
+
+
+def summary_line(study: Study) -> str:
+    """What the scene's own tolerance gives and takes, in one sentence."""
+    point, name = default_point(study), study.scene.name or "the scene"
+    if point is None or point.errors is None:
+        return f"{study.kind.capitalize()} of {name}"
+    error, time = _share(point.errors.worst_rms), _time(point.trial.seconds)
+    return f"{name}: {error} in {time} at its tolerance {point.trial.rtol:g}"
+
+
+def cost_table(study: Study) -> Table:
+    """Error against seconds of every run that ended, in four columns."""
+    cells = [
+        (one.series, one.trial.setting, _share(one.errors.worst_rms), _time(one.trial.seconds))
+        for one in study.points
+        if one.errors is not None
+    ]
+    return Table(
+        f"what accuracy costs: {summary_line(study)}",
+        ("", "tolerance", "error of force and sliding, RMS", "time"),
+        cells,
+    )
+
+
+def draw_summary(study: Study, path: str | Path) -> None:
+    """Draw error against seconds in one panel, with the scene's own tolerance marked: .png, .svg or .pdf."""
+    from msfp_gen.figures import plot_work_precision
+
+    table = {}
+    for series, columns in figure_table(study).items():
+        worst = [nan if one.errors is None else one.errors.worst_rms for one in study.of(series)]
+        table[series] = {name: columns[name] for name in ("seconds", "failed", "cut", "wrong")} | {"error": worst}
+    point = default_point(study)
+    marks = {} if point is None or point.errors is None else {
+        f"tolerance {point.trial.rtol:g}": {"seconds": point.trial.seconds, "error": point.errors.worst_rms}
+    }  # fmt: skip
+    plot_work_precision(
+        table, path, errors={"error": "error of force and sliding, RMS"}, marks=marks, title=summary_line(study)
+    )
+
+
+def _share(error: float) -> str:
+    return f"{100 * error:.2g} %"
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds:.2f} s" if seconds >= 0.1 else f"{1e3 * seconds:.2g} ms"
+
+
 def write(study: Study, folder: Path) -> list[Path]:
-    """Write CSV, JSON, Markdown and the figure as SVG and PNG to `folder`; returns the paths.
+    """Write CSV, JSON, Markdown and the figures as SVG and PNG to `folder`; returns the paths.
+
+    The summary has one panel, error against seconds; the other figure has one for each kind of error and of cost.
 
     Raises InputError if the folder cannot be made or written to.
     """
@@ -444,6 +502,8 @@ def write(study: Study, folder: Path) -> list[Path]:
     write_rows(paths["csv"], rows(study))
     write_bytes(paths["json"], [json.dumps(as_dict(study), indent=2, allow_nan=False).encode()])
     write_bytes(paths["md"], [markdown(study).encode()])
+    summary = folder / f"{study.kind}-summary.png"
+    draw_summary(study, summary)
     draw(study, paths["svg"])
     draw(study, paths["png"])
-    return list(paths.values())
+    return [summary, *paths.values()]

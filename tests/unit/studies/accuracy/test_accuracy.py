@@ -217,8 +217,23 @@ def test_failures_and_wrong_successes_are_marked():
     assert columns["seconds"][2] == pytest.approx(20.0) and columns["newton"][2] == pytest.approx(50.0)
     cells = study.tables(made)[0].rows
     assert cells[0][2] == "WRONG SUCCESS" and cells[1][2] == "newton" and cells[2][3] == "(about 20)"
+    assert [row[2] for row in study.cost_table(made).rows] == ["14 %"]  # 0.2 times sqrt(1/2)
     left_out = Point("c", trial("c", status=REFUSED), None, False)
     assert "c" not in study.figure_table(replace(made, points=(*points, left_out)))
+
+
+def test_the_summary_marks_the_tolerance_of_the_scene(tmp_path):
+    scene = load_scene("fenz-test1")
+    reference = Reference(trial(rtol=1e-9), trial("b"), errors(trial(wave=1e-6), trial()))
+    runs = [trial("implicit", 10 * scene.solver.rtol, 0.01), trial("implicit", scene.solver.rtol, 0.001)]
+    points = tuple(study.point_of("implicit", run, reference) for run in runs)
+    made = Study(scene, "work-precision", points, reference, ())
+    assert study.default_point(made) is points[1]
+    line = study.summary_line(made)
+    assert f"{100 * points[1].errors.worst_rms:.2g} %" in line and "1.00 s" in line and f"{scene.solver.rtol:g}" in line
+    study.draw_summary(made, tmp_path / "summary.png")
+    assert (tmp_path / "summary.png").read_bytes().startswith(b"\x89PNG")
+    assert study.default_point(replace(made, points=points[:1])) is None
 
 
 @pytest.mark.parametrize(
@@ -244,7 +259,7 @@ def test_command_writes_and_prints(tmp_path, capsys, monkeypatch):
     words = ["bench", "work-precision", "fenz-test1", "--duration", "0.3", "--methods", "implicit,Radau"]
     assert main([*words, "--tolerances", "1e-2,1e-3", "-o", str(tmp_path / "out"), "--json"]) == 0
     out, err = capsys.readouterr()
-    assert len(json.loads(out)["points"]) == 4 and "implicit at 0.01: ok" in err and err.count("wrote ") == 5
+    assert len(json.loads(out)["points"]) == 4 and "implicit at 0.01: ok" in err and err.count("wrote ") == 6
     assert main([*words[:5], "--tolerances", "1e-2", "--methods", "implicit"]) == 0
     assert "own family alone" in capsys.readouterr().out
 
