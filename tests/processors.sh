@@ -9,7 +9,7 @@ log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 
 export NPY_DISABLE_CPU_FEATURES
-NPY_DISABLE_CPU_FEATURES=$(PYTHONPATH=tests "$bin/python" -c 'import support.digests as d; print(*d.wide_features())')
+NPY_DISABLE_CPU_FEATURES=$(PYTHONPATH=tests "$bin/python" -c 'import support.processors as d; print(*d.wide_features())')
 if grep -qw avx2 /proc/cpuinfo 2>/dev/null; then export OPENBLAS_CORETYPE=Haswell; fi
 # Its own log: the summary of pytest that CI ends with is the one of `make test`.
 "$bin/python" -m pytest -q -n auto --dist loadfile -m "not slow" tests/physics \

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.elementary import cos, sin
 from msfp_gen.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ class State:
 
 def rotated(vectors: Array, angle: float) -> Array:
     """Components, shape (..., 3), of vectors in a frame that is rotated by `angle` [rad] about E3."""
-    c, s = cos(angle), sin(angle)
+    c, s = np.cos(angle), np.sin(angle)
     one, two, three = np.moveaxis(vectors, -1, 0)
     # Component by component: the digits of a product of matrices depend on the number of vectors.
     return np.stack([c * one + s * two, c * two - s * one, three], axis=-1)
@@ -161,8 +160,8 @@ def out_of_plane(values: Array, azimuth: float, kind: Kind) -> Array:
         return rotated_pairs(values, -azimuth)
     first = 1 if kind in ("angles", "pair_angles") else 0
     out = np.array(values)
-    out[..., 0] = -sin(azimuth) * values[..., first]
-    out[..., 1] = cos(azimuth) * values[..., first]
+    out[..., 0] = -np.sin(azimuth) * values[..., first]
+    out[..., 1] = np.cos(azimuth) * values[..., first]
     if abs(azimuth - np.pi / 2) < 1e-9:
         out[..., 1] = 0.0
     return out
@@ -175,25 +174,25 @@ def tilts_out_of_plane(q: Array, v: Array, azimuth: float) -> tuple[Array, Array
     the axes t_3 and their rates of the planar stack; and the twist of bodies 1..n-1 about t_3, shape (n-1,) [rad], by
     which their t_1 is turned from where a rotation in the plane has it.
     """
-    along, up = np.array([cos(azimuth), sin(azimuth), 0.0]), np.array([0.0, 0.0, 1.0])
+    along, up = np.array([np.cos(azimuth), np.sin(azimuth), 0.0]), np.array([0.0, 0.0, 1.0])
     side = np.cross(up, along)
     angles, rates, twist = np.zeros_like(q), np.zeros_like(v), np.zeros(len(q))
     t, w = np.eye(3), np.zeros(3)  # rows t_1, t_2, t_3 of the body below, and its angular velocity
     for k, (tilt, speed) in enumerate(zip(np.cumsum(q[:, 1]), np.cumsum(v[:, 1]), strict=True)):
-        axis = sin(tilt) * along + cos(tilt) * up
+        axis = np.sin(tilt) * along + np.cos(tilt) * up
         x, y, z = np.sum(t * axis, axis=1)
         psi, theta, before = atan2(-y, z), asin(x), t[0]
-        second = cos(psi) * t[1] + sin(psi) * t[2]  # (2.4)
+        second = np.cos(psi) * t[1] + np.sin(psi) * t[2]  # (2.4)
         t = np.array([np.cross(second, axis), second, axis])
         rest = np.cross(speed * side - w, axis)
-        rate = -np.sum(rest * t[1]) / cos(theta), np.sum(rest * t[0])
+        rate = -np.sum(rest * t[1]) / np.cos(theta), np.sum(rest * t[0])
         w = w + rate[0] * before + rate[1] * t[1]  # (3.12)
         angles[k, :2], rates[k, :2] = (psi, theta), rate
         if k + 1 < len(q):
             radial = np.cross(side, axis)  # of the plane, turned with the body
             along_radial, along_side = np.sum(t[0] * radial), np.sum(t[0] * side)
             twist[k + 1] = atan2(
-                sin(azimuth) * along_radial + cos(azimuth) * along_side,
-                cos(azimuth) * along_radial - sin(azimuth) * along_side,
+                np.sin(azimuth) * along_radial + np.cos(azimuth) * along_side,
+                np.cos(azimuth) * along_radial - np.sin(azimuth) * along_side,
             )
     return angles, rates, twist

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.elementary import cos, sin
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import require_type
 from msfp_gen.motions import piecewise, sources
@@ -186,7 +185,7 @@ class Motion:
                 f"rotated: angle {angle:g} on a motion that rocks the base (psi_1 or theta_1 not zero); "
                 "build the motion in the turned axes"
             )
-        c, s = cos(angle), sin(angle)
+        c, s = np.cos(angle), np.sin(angle)
         coefficients = self.coefficients.copy()
         coefficients[:, 0] = c * self.coefficients[:, 0] - s * self.coefficients[:, 1]
         coefficients[:, 1] = s * self.coefficients[:, 0] + c * self.coefficients[:, 1]
@@ -317,7 +316,7 @@ class Motion:
         period = 1 / positive("frequency", frequency)
         rise = period / 4 if lead_in is None else lead_in
         azimuth = number("direction", direction)
-        sines = [(float(cos(azimuth)), 1.0, 0.0), (float(sin(azimuth)), 1.0, 0.0)]
+        sines = [(float(np.cos(azimuth)), 1.0, 0.0), (float(np.sin(azimuth)), 1.0, 0.0)]
         return cls._of(sources.enveloped_sines(amplitude, sines, period, cycles, rise), name)
 
     @classmethod
@@ -369,7 +368,7 @@ class Motion:
         knots = np.array([0.0, positive("duration", duration)])
         pieces = np.zeros((1, 6, piecewise.ORDER))
         half, azimuth = positive("acceleration", acceleration) / 2, number("direction", direction)
-        pieces[0, :2, 2] = half * cos(azimuth), half * sin(azimuth)
+        pieces[0, :2, 2] = half * np.cos(azimuth), half * np.sin(azimuth)
         return cls(knots, pieces, name=name, metadata={"source": "ramp", "acceleration": acceleration})
 
     @classmethod

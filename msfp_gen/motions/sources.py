@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.elementary import cos, sin
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite, positive, samples
 from msfp_gen.motions.piecewise import ORDER, Pieces, from_rates, hermite5
@@ -123,7 +122,7 @@ def smoothstep(time: Array, rise: float) -> Wave:
 def sine(time: Array, angular_frequency: float, phase: float = 0.0) -> Wave:
     """sin(angular_frequency * time + phase) at `time`, shape (k,), [s]; angular frequency [rad/s], phase [rad]."""
     w, angle = angular_frequency, angular_frequency * time + phase
-    return sin(angle), w * cos(angle), -(w**2) * sin(angle)
+    return np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle)
 
 
 def product(first: Wave, second: Wave) -> Wave:

@@ -17,7 +17,6 @@ from typing import Annotated, Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.elementary import exp
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.scene.fidelity import at_fidelity
@@ -79,7 +78,7 @@ class Distribution:
             shares = low + shares * (high - low)
         values = np.asarray(_scipy_distribution(self.kind, self.parameters).ppf(shares))
         if self.kind == "lognormal":  # the exponential of NumPy depends on the processor
-            values = self.parameters[0] * exp(values)
+            values = self.parameters[0] * np.exp(values)
         return values if self.between is None else np.clip(values, *self.between)
 
     def share(self, value: float) -> float:

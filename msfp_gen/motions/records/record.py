@@ -10,7 +10,6 @@ from typing import Any, NoReturn
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.elementary import cos, sin
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite, positive
 from msfp_gen.motions.records.text import Lines
@@ -108,7 +107,7 @@ class Record:
 
     def rotated(self, angle: float) -> Record:
         """The record with its horizontal components rotated by `angle` [rad] about E3, from E1 towards E2."""
-        c, s = cos(angle), sin(angle)
+        c, s = np.cos(angle), np.sin(angle)
 
         def turn(values: Array) -> Array:
             one, two, three = values.T

@@ -1,12 +1,10 @@
-"""The elementary functions of the runtime: accuracy, limits, and the polynomials that a script derives."""
+"""The elementary functions of the runtime: accuracy and limits."""
 
 from __future__ import annotations
 
 import ctypes
-import importlib.util
 import re
 import subprocess
-from types import ModuleType
 
 import mpmath as mp
 import numpy as np
@@ -14,7 +12,6 @@ import pytest
 from support import ROOT, Array
 
 from msfp_gen import Effects, Layout
-from msfp_gen.common import elementary
 from msfp_gen.generator import generate
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.specification.layout import ModelSpec
@@ -96,34 +93,6 @@ def test_limits(library: ctypes.CDLL) -> None:
     np.testing.assert_array_equal(values("pow", [0.0, 0.0, 2.0, -2.0], [-0.3, 0.3, 0.0, 0.5]), [inf, 0.0, 1.0, nan])
     np.testing.assert_allclose(values("pow", [-2.0, -2.0, -0.5], [3.0, 6.0, -5.0]), [-8.0, 64.0, -32.0], rtol=1e-14)
     np.testing.assert_array_equal(values("tanh", [inf, -inf, nan, 0.0]), [1.0, -1.0, nan, 0.0])
-
-
-@pytest.fixture(scope="module")
-def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("polynomials", ROOT / "tools" / "polynomials.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.mark.parametrize("name", ["sin", "cos", "asin", "exp", "log"])
-def test_polynomials_are_those_of_the_script(script: ModuleType, name: str) -> None:
-    text = HEADER.read_text(encoding="utf-8").partition(f"msfp_{name}_rest(double z)")[2]
-    written = re.sub(r"\s+", "", text.partition("return ")[2].partition(";")[0])
-    assert written == re.sub(r"\s+", "", script.as_c(script.polynomial(name)))
-
-
-def test_functions_of_inputs_are_those_of_the_runtime(library: ctypes.CDLL, script: ModuleType) -> None:
-    """Bit by bit: a motion or a sample made in Python is that of a program in C."""
-    for name in ("sin", "cos", "exp"):
-        assert list(getattr(elementary, f"{name.upper()}_REST")) == script.polynomial(name)
-        x = np.random.default_rng(9).uniform(-1, 1, 4000) * 10.0 ** np.random.default_rng(10).uniform(-9, 2.8, 4000)
-        ends = [709.0, -708.0, -709.0] if name == "exp" else [np.pi / 4, -np.pi / 4, 99999.0, 1e7]
-        x = np.concatenate([x, [0.0, -0.0, *ends]])
-        found = getattr(elementary, name)(x)
-        assert found.tobytes() == evaluated(library, name, x).tobytes()
-        assert found[3] == getattr(elementary, name)(x[3])
 
 
 def test_no_kernel_calls_the_functions_of_the_system(library: ctypes.CDLL) -> None:

@@ -1,11 +1,9 @@
-"""Digests of what runs are computed from, and of rows: `python -m support.digests` prints them as JSON."""
+"""What runs are computed from, and rows: `python -m support.processors FILE` writes them for a comparison."""
 
 from __future__ import annotations
 
-import hashlib
-import json
+import sys
 from dataclasses import fields, replace
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +11,7 @@ from msfp_gen import Motion, load_scene, simulate
 from msfp_gen.model.plane import motion_in_plane
 from msfp_gen.motions import records
 from msfp_gen.studies.axes import Distribution
+from support import Array
 
 
 def wide_features() -> list[str]:
@@ -20,11 +19,6 @@ def wide_features() -> list[str]:
     from numpy._core._multiarray_umath import __cpu_dispatch__
 
     return [name for name in __cpu_dispatch__ if name == "X86_V4" or name.startswith("AVX512")]
-
-
-def digest(*arrays: Any) -> str:
-    content = b"".join(np.ascontiguousarray(array, dtype=float).tobytes() for array in arrays)
-    return hashlib.sha256(content).hexdigest()
 
 
 def motions() -> dict[str, Motion]:
@@ -50,19 +44,27 @@ def motions() -> dict[str, Motion]:
     }
 
 
-def digests() -> dict[str, str]:
-    found = {name: digest(each.knots, each.coefficients) for name, each in motions().items()}
+def inputs() -> dict[str, Array]:
+    """Coefficients of motions, and values that a study draws."""
+    found = {name: each.coefficients for name, each in motions().items()}
     shares = np.random.default_rng(2).random(2000)
     for kind, parameters in (("lognormal", (0.05, 0.2)), ("normal", (0.05, 0.01)), ("triangular", (0.0, 0.3, 1.0))):
-        found[kind] = digest(Distribution(kind, parameters).values(shares))
+        found[kind] = Distribution(kind, parameters).values(shares)
+    return found
+
+
+def rows() -> dict[str, Array]:
+    """Rows of a run in space and of one in an oblique plane, by run and field."""
     scene = load_scene("becker-eight-50")
     wave = replace(load_scene("fenz-test2"), motion=Motion.harmonic(0.025, 0.4, direction=0.4, cycles=1))
-    for name, each in (("rows in space", replace(scene, duration=25.0)), ("rows in a plane", wave)):
+    found = {}
+    for name, each in (("space", replace(scene, duration=25.0)), ("plane", wave)):
         history = simulate(each).history
-        values = [getattr(history, field.name) for field in fields(history)]
-        found[name] = digest(*(value for value in values if isinstance(value, np.ndarray)))
+        for field in fields(history):
+            if isinstance(value := getattr(history, field.name), np.ndarray):
+                found[f"{name} {field.name}"] = value
     return found
 
 
 if __name__ == "__main__":
-    print(json.dumps(digests()))
+    np.savez(sys.argv[1], **inputs(), **rows())
