@@ -63,11 +63,10 @@ def test_functions_return_what_their_docstrings_say(effects: dict[str, Any]) -> 
 
 
 @pytest.mark.parametrize("effects", MODELS, ids=str)
-def test_the_example_of_a_module_is_of_this_module(effects: dict[str, Any]) -> None:
+def test_the_example_of_a_module_returns_what_it_names(effects: dict[str, Any]) -> None:
     module = model_of((5, 2, 2), **effects).extension
     text = module.__doc__ or ""
-    assert f"import numpy as np, {module.__name__}" in text and f"{module.__name__}.Stack(" in text
-    assert "MODULE" not in text and ("msfp_5_2_2." in text) == (module.__name__ == "msfp_5_2_2")
+    assert "model.Stack(" in text and "5_2_2" not in text
     example = re.search(r">>> ([\w, ]+) = stack\.accelerations", text)
     assert example is not None
     assert len(example[1].split(",")) == len(returned(inspect.getdoc(module.Stack.accelerations) or ""))
