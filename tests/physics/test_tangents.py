@@ -26,6 +26,7 @@ EFFECTS = [
     {"top_rotation": True},
 ]
 CASES = [*((layout, {}) for layout in LAYOUTS), *(((5, 2, 2), effects) for effects in EFFECTS[1:])]
+QUICK = [((2, 1, 0), {}), ((3, 1, 1), {})]  # whose fast models other tests have too
 FORWARD = "-DMSFP_FORWARD_TANGENT=1"
 """The emitted tangent in place of that of tangent.c (equations.h)."""
 
@@ -58,8 +59,11 @@ def tangents(layout: tuple[int, int, int], effects: dict[str, object]) -> list[n
     return found
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("layout", "effects"), CASES, ids=str)
+@pytest.mark.parametrize(
+    ("layout", "effects"),
+    [pytest.param(*case, marks=[] if case in QUICK else pytest.mark.slow) for case in CASES],
+    ids=str,
+)
 def test_fast_tangent_equals_the_emitted_one(layout, effects):
     command = [sys.executable, __file__, json.dumps([layout, effects])]
     environment = os.environ | {"MSFP_GEN_CFLAGS": FORWARD, "PYTHONPATH": str(Path(__file__).parents[1])}
