@@ -144,8 +144,9 @@ def test_killed_estimates_continue_with_the_same_draws(tmp_path: Any, capsys: py
         found.append(json.loads(capsys.readouterr().out))
     assert before.items() <= {part.name: part.stat().st_mtime_ns for part in out.glob("part-*.parquet")}.items()
     pd.testing.assert_frame_equal(rows_of(out).head(16), rows_of(whole).head(16))
-    low, high = found[0]["interval"]
-    assert low <= found[1]["value"] <= high and found[0]["runs"]["exact"] >= 16
+    # How many runs follow the first ones depends on measured seconds, so that the values differ within both intervals.
+    assert max(one["interval"][0] for one in found) <= min(one["interval"][1] for one in found)
+    assert all(one["runs"]["exact"] >= 16 for one in found)
 
 
 def test_ctrl_c_keeps_what_is_done(tmp_path: Any) -> None:

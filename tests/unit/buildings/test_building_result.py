@@ -345,7 +345,7 @@ def test_a_doubt_about_a_shared_bearing_is_one_note() -> None:
 def test_what_is_left_names_its_surface_and_what_is_used_is_of_the_bearing():
     """The least gap may be of an inner surface while the dishes have more left."""
     run = pushed()
-    for one, demand in zip(run.bearings, run.characterise().bearings, strict=True):
+    for index, (one, demand) in enumerate(zip(run.bearings, run.characterise().bearings, strict=True)):
         gaps = one.extremes.gap
         surface, capacity = int(gaps.argmin()), Backbone.of(one.bearing).capacity
         used = float(one.extremes.displacement[3]) / capacity
@@ -353,7 +353,7 @@ def test_what_is_left_names_its_surface_and_what_is_used_is_of_the_bearing():
             (run.part_tables()[-1], "least left [mm]"),
             (run.characterise().demand_table(), "left [mm]"),
         ):
-            row = table.rows[one.index]
+            row = table.rows[index]
             assert row[table.columns.index(column)] == f"{1e3 * gaps[surface]:.1f} of {surface + 1}"
             assert row[table.columns.index("used [%]")] == f"{100 * used:.0f}"
         assert demand.capacity_left == gaps.min() and demand.displacement_used == used
