@@ -58,7 +58,7 @@ def _draw_section(axes: Axes, report: SheetReport) -> None:
     axes.set(title="section at rest", xlabel="from the axis [mm]", ylabel="height [mm]")
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(visible=False)
-    axes.legend(loc="center right", fontsize=SMALL)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=report.sheet.surfaces, fontsize=SMALL)
 
 
 def _draw_backbone(axes: Axes, report: SheetReport) -> None:
