@@ -39,8 +39,8 @@ def sheet(
 ) -> None:
     """State what follows from the data sheet of a bearing: geometry, masses, backbone, effective properties."""
     from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
+    from msfp_gen.design.sheet import SheetReport
     from msfp_gen.scene.file.loader import load_sheet
-    from msfp_gen.scene.sheet_tables import SheetReport
 
     if output is not None:
         check_output(output, FIGURE_SUFFIXES, "--output")
@@ -85,10 +85,10 @@ def equivalent(
     as_json: AsJson = False,
 ) -> None:
     """Equivalent lateral procedure: displacement and base shear from a spectrum, at each bound of friction."""
+    from msfp_gen.design import equivalent as procedure
+    from msfp_gen.design.sheet import SheetReport
     from msfp_gen.motions.records.scaling import read_spectrum
-    from msfp_gen.scene import equivalent as procedure
     from msfp_gen.scene.file.loader import load_sheet
-    from msfp_gen.scene.sheet_tables import SheetReport
 
     pairs, (factor, rule) = read_spectrum(spectrum), procedure.damping_of(damping)
     arms = None if torsion is None else _lengths(torsion)

@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.design.sheet import SheetReport
 from msfp_gen.figures.section import STEEL
-from msfp_gen.figures.style import COLOURS, HAIR, INK, LINE, MILLI, SMALL, colour, headline, page
+from msfp_gen.figures.style import CASE_COLOURS, HAIR, INK, LINE, MILLI, SMALL, colour, headline, page
 from msfp_gen.results.geometry import outline, slider_face
-from msfp_gen.scene.sheet_tables import SheetReport
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-LINE_COLOURS = {"lower": COLOURS[0], "nominal": INK, "upper": COLOURS[1]}
 
 
 def plot_sheet(report: SheetReport, path: str | Path | None = None) -> Figure:
@@ -65,10 +63,10 @@ def _draw_backbone(axes: Axes, report: SheetReport) -> None:
     for case, backbone in report.backbones.items():
         u, force = backbone.points
         load = report.sheet.axial_load / 1e3
-        axes.plot(np.r_[0.0, u] * MILLI, np.r_[0.0, force] * load, color=LINE_COLOURS[case], label=case)
+        axes.plot(np.r_[0.0, u] * MILLI, np.r_[0.0, force] * load, color=CASE_COLOURS[case], label=case)
         found = report.effective[case]
         places = [at.displacement * MILLI for at in found], [at.force * load for at in found]
-        axes.plot(*places, "o", color=LINE_COLOURS[case], markersize=4)
+        axes.plot(*places, "o", color=CASE_COLOURS[case], markersize=4)
     axes.set(title="published backbone", xlabel="displacement [mm]", ylabel="force [kN]")
     axes.set_ylim(bottom=0)
     axes.legend(loc="upper left")

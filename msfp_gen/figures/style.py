@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 # The palette of Okabe and Ito, which can be distinguished in print and by colour-blind readers.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 INK, FAINT, PALE = "#222222", "#999999", "#E4E4E4"
+# Of the bounds of friction, in the order of drawing, so that the nominal curve is on top. Solid lines, since repeated
+# cycles would fill dashes.
+CASE_COLOURS = {"lower": COLOURS[0], "upper": COLOURS[1], "nominal": INK}
 LINE, THIN, HAIR, BOLD = 1.3, 0.9, 0.7, 2.6  # widths [pt]: curves, reference lines, grids, highlights
 SMALL = 8.0  # font size of notes in a figure [pt]
 FAMILY = "DejaVu Sans"  # comes with matplotlib

@@ -18,6 +18,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, check_fields
 
 Values = dict[str, Any]
+Face = tuple[float, float, float] | None  # radius of its sphere, of its edge [m], 1 if convex, -1 if concave
 _LENGTHS = Quantity("m", above=0.0, shape=(None,))
 _COEFFICIENTS = Quantity("", least=0.0, shape=(None,))
 # Device -> (number of concave-up surfaces, of concave-down ones) of its layout.
@@ -205,7 +206,7 @@ class Sheet:
             body["rim_offset"] = float(np.mean([_sagitta(*face[:2]) for face in edges]))
         return {**body, "inertia": list(moments)}
 
-    def _face(self, surface: int, body: int, radii: Sequence[float], m: int) -> tuple[float, float, float] | None:
+    def _face(self, surface: int, body: int, radii: Sequence[float], m: int) -> Face:
         """Radius of a face, radius of its edge, and 1 for a slider's, -1 for a dish; None: the body has none there."""
         if not 0 <= surface < len(radii):
             return None
@@ -221,9 +222,6 @@ class Sheet:
 def _sagitta(radius: float, edge: float) -> float:
     """Height of a spherical cap [m]: of a face at its edge over its middle."""
     return radius - sqrt(radius**2 - edge**2)
-
-
-Face = tuple[float, float, float] | None
 
 
 def revolved(height: float, lower: Face, upper: Face, density: float) -> tuple[float, float, tuple[float, float]]:

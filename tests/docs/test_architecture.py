@@ -22,7 +22,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 # The packages and the modules beside them, lowest first: each imports only itself and what stands before it.
 ORDER = (
     "common", "specification", "generator", "templates", "runtime", "jit", "motions", "scene",
-    "model", "embedding", "results", "figures", "simulation",
+    "model", "embedding", "results", "design", "figures", "simulation",
     "studies", "report", "buildings", "", "cli", "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
 

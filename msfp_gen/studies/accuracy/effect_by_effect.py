@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import isfinite, nan
 from typing import Any
 
+import numpy as np
+
+from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.fields import Choice, ruled_fields
 from msfp_gen.common.tables import Table
 from msfp_gen.results.quantities import quantities
-from msfp_gen.results.verdict import Verdict
+from msfp_gen.results.verdict import Reading
 from msfp_gen.scene.scene import WIDER
 from msfp_gen.scene.system import System
 from msfp_gen.simulation.simulate import simulate
+from msfp_gen.specification.formula import names_in
+from msfp_gen.specification.friction_laws import BUILT_IN, VARIABLES, Law, law_of
 from msfp_gen.specification.layout import OF_THE_SCENE, Effects
 
-SIMPLER_FRICTION = {"pvt": ("pv", "constant"), "pv": ("constant",), "velocity": ("constant",), "custom": ("constant",)}
 TOLERANCE = "tolerance"  # in place of an effect, in the row of the numerical error
 TIGHTER = 0.1  # tolerance of the run that measures the numerical error, over that of the scene
 REPEATS, LONG_ENOUGH = 3, 0.3  # runs of which the fastest is timed; one run alone if it takes so long [s]
@@ -27,10 +31,14 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """One run: value of every quantity by its column, state of every limit as (reached, allowed), and seconds."""
+    """One run.
 
-    values: Mapping[str, float]
-    limits: Mapping[str, tuple[float, float]]
+    values: of every quantity, an array of shape (m,) over m surfaces or floors in its SI unit, such as [m]; NaN where
+    it has no value. limits: the worst reading of each, by its name. seconds: of the fastest run.
+    """
+
+    values: Mapping[str, Array]
+    limits: Mapping[str, Reading]
     seconds: float
 
 
@@ -121,7 +129,8 @@ def effect_by_effect(system: System, say: Say = lambda _: None, only: Collection
     base, ended = _run(system)
     say(f"tolerance {TIGHTER * system.solver.rtol:g}")
     tight, _ = _run(replace(system, solver=replace(system.solver, rtol=TIGHTER * system.solver.rtol)))
-    noise = {key: abs(base.limits[key][0] - tight.limits[key][0]) for key in base.limits.keys() & tight.limits.keys()}
+    both = base.limits.keys() & tight.limits.keys()
+    noise = {key: abs(base.limits[key].value.reached - tight.limits[key].value.reached) for key in both}
     states = _states(base, noise)
     found = [_change(TOLERANCE, f"{system.solver.rtol:g}", f"{TIGHTER * system.solver.rtol:g}", base, tight, {}, {})]
     for effect, before, after, changes in _alternatives(system.every_effects, ended):
@@ -144,27 +153,25 @@ def _run(system: System) -> tuple[Outcome, dict[str, Any]]:
     seconds = [float(result.summary["wall_time"])]
     while len(seconds) < REPEATS and seconds[0] < LONG_ENOUGH:
         seconds.append(float(simulate(system).summary["wall_time"]))
-    values = {
-        column: float(value)
-        for column, source in quantities(system).items()
-        if source.quantity.kept and source.quantity.side
-        and isinstance(value := source.value(result.summary, None), float) and isfinite(value)
-    }  # fmt: skip
+    columns: dict[str, list[float]] = {}
+    for column, source in quantities(system).items():
+        if source.quantity.kept and source.quantity.side:
+            name = column if source.place is None else column.rpartition("_")[0]
+            value = source.value(result.summary, None)
+            columns.setdefault(name, []).append(nan if value is None else float(value))
+    values = {name: np.array(each) for name, each in columns.items() if np.isfinite(each).any()}
     words = result.provenance.get("model", "").replace(", then ", "-").split("-")
     ended = {name: value for word, (name, value) in WIDER.items() if word in words}
-    return Outcome(values, _limits(result.verdict), min(seconds)), ended
-
-
-def _limits(verdict: Verdict) -> dict[str, tuple[float, float]]:
-    return {one.limit.name: (one.value.reached, one.value.allowed) for one in verdict.worst.values()}
+    limits = {one.limit.name: one for one in result.verdict.worst.values()}
+    return Outcome(values, limits, min(seconds)), ended
 
 
 def _states(outcome: Outcome, noise: Mapping[str, float]) -> dict[str, str]:
-    """Limit -> within, exceeded, or undecided where it lies within the numerical error."""
+    """Limit -> within or exceeded, as the verdict has it, or undecided where it lies within the numerical error."""
     states = {}
-    for name, (reached, allowed) in outcome.limits.items():
-        beyond = reached - allowed
-        states[name] = "undecided" if abs(beyond) < noise.get(name, 0.0) else "exceeded" if beyond > 0 else "within"
+    for name, one in outcome.limits.items():
+        near = abs(one.value.reached - one.value.allowed) < noise.get(name, 0.0)
+        states[name] = "undecided" if near else "exceeded" if one.exceeded else "within"
     return states
 
 
@@ -174,12 +181,11 @@ def _change(
 ) -> EffectChange:  # fmt: skip
     """How another outcome differs from that of the system."""
     limits = {name: state for name, state in others.items() if states.get(name, state) != state}
-    changes: dict[str, float] = {}
-    for name in dict.fromkeys(column.rstrip("0123456789").rstrip("_") for column in base.values):
-        columns = [column for column in base.values if column.rstrip("0123456789").rstrip("_") == name]
-        scale = max(abs(base.values[column]) for column in columns)
-        moved = max((other.values.get(column, inf) - base.values[column] for column in columns), key=abs)
-        changes[name] = moved / scale if scale else 0.0 if moved == 0 else inf
+    changes = {}
+    for name, values in base.values.items():
+        found = other.values.get(name, np.full_like(values, nan))
+        moved = np.where(np.isnan(values) & np.isnan(found), 0.0, found - values)
+        changes[name] = float(moved[np.abs(moved).argmax()] / np.nanmax(np.abs(values))) if moved.any() else 0.0
     cost = other.seconds / base.seconds if base.seconds else None
     return EffectChange(effect, before, after, changes, cost, limits)
 
@@ -189,14 +195,28 @@ def _alternatives(
 ) -> Iterator[tuple[str, str, str, dict[str, Any]]]:
     """Effect, its value, another value, both in words, and the fields that give it; values are of the first bearing."""
     has = {**vars(every[0]), **ended}
+    simpler = simpler_laws(law_of(has["friction"], has["friction_law"]))
     for name, rule, _ in ruled_fields(Effects):
         if name in OF_THE_SCENE or not isinstance(rule, Choice) or (name == "spin" and has["dimension"] == "planar"):
             continue
-        others = SIMPLER_FRICTION.get(has[name], ()) if name == "friction" else rule.words
+        others = simpler if name == "friction" else rule.words
         more = {"friction_law": None} if name == "friction" else {}
         for other in others:
             if other != has[name]:
                 yield name, _word(has[name]), _word(other), {name: other, **more}
+
+
+def simpler_laws(law: Law | None) -> list[str]:
+    """Friction laws that depend on less than a law and need no other number, then constant friction."""
+    if law is None:
+        return []
+    known, variables = {*law.parameters, *law.also_accepted}, names_in(law.tree) & VARIABLES.keys()
+    simpler = [
+        other.word
+        for other in BUILT_IN.values()
+        if known.issuperset(other.parameters) and names_in(other.tree) & VARIABLES.keys() < variables
+    ]
+    return [*simpler, "constant"]
 
 
 def _word(value: object) -> str:

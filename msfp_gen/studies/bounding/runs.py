@@ -21,8 +21,7 @@ from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.figures.bearing import axes_along
 from msfp_gen.figures.style import (
-    COLOURS,
-    INK,
+    CASE_COLOURS,
     THIN,
     displacement,
     displacement_label,
@@ -78,7 +77,8 @@ class Case:
 
     def place(self, source: Source) -> str:
         """Where the value of a quantity is, and its share of what is allowed there; "" where it names no place."""
-        return str(getattr(self.characterisation, source.quantity.where or "_", ""))
+        where = source.quantity.where
+        return str(getattr(self.characterisation, where)) if where and self.characterisation is not None else ""
 
     @property
     def stopped_at(self) -> float | None:
@@ -347,8 +347,6 @@ SHOWN = {
     "W/m^2": ("kW/m2", 1e-3),
     "": ("%", 100.0),
 }
-# In the order of drawing, so that the nominal loop is on top. Solid lines, since repeated cycles would fill dashes.
-LINE_COLOURS = {"lower": COLOURS[0], "upper": COLOURS[1], "nominal": INK}
 
 
 def shown_as(unit: str) -> tuple[str, float]:
@@ -436,7 +434,7 @@ def plot_bounds(bounds: Bounds, path: str | Path | None = None) -> Figure:
     A run that failed is drawn up to its last row; a run without rows is not drawn. Raises InputError for a path that
     cannot be written.
     """
-    plotted = [case for name in LINE_COLOURS for case in bounds.cases if case.name == name and case.result is not None]
+    plotted = [case for name in CASE_COLOURS for case in bounds.cases if case.name == name and case.result is not None]
     axes = sorted({axis for case in plotted for axis in axes_along(_loop(case.result)[0])}) or [0]
     with page(6.4 * len(axes), 5.0, path, "bounds") as figure:
         name = next(case.scene.name for case in bounds.cases if case.name == "nominal") or "unnamed scene"
@@ -451,7 +449,7 @@ def _draw(axes: Axes, bounds: Bounds, cases: list[Case], axis: int) -> None:
     forces = [force[:, axis] for _, force in loops]
     scale = engineering(np.concatenate(forces), "N") if forces else engineering(0.0, "N")
     for case, (u, _), values in zip(cases, loops, forces, strict=True):
-        style: dict[str, Any] = {"color": LINE_COLOURS[case.name], "linewidth": THIN, "label": _label(bounds, case)}
+        style: dict[str, Any] = {"color": CASE_COLOURS[case.name], "linewidth": THIN, "label": _label(bounds, case)}
         axes.plot(displacement(u[:, axis]), force(values, scale), **style)
     sign = subscript(axis + 1)
     axes.set(

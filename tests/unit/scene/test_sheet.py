@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from msfp_gen import Bearing, InputError, load_scene, presets
+from msfp_gen.design.effective import characteristic, effective, published_backbone, regimes
 from msfp_gen.results.geometry import outline
-from msfp_gen.scene.effective import characteristic, effective, published_backbone, regimes
 from msfp_gen.scene.file.loader import bearing_from_table, complete_bearing, scene_from_table
 from msfp_gen.scene.sheet import Sheet, revolved
 from msfp_gen.studies.bounding import SHEET, bounded_scenes, factors_of

@@ -1,15 +1,19 @@
 """`effect_by_effect`: changes, cost and verdicts are those of runs that a person would compare."""
 
 from dataclasses import replace
+from math import isfinite, nan
 
+import numpy as np
 import pytest
 from support import ROOT
 
 from msfp_gen import Limits, load_scene, simulate
 from msfp_gen.common.errors import InputError
+from msfp_gen.results.verdict import Limit, Reading, Value
 from msfp_gen.scene.friction_parameters import bearing_for
 from msfp_gen.scene.system import OtherSystem
-from msfp_gen.studies.accuracy.effect_by_effect import Outcome, _change, _states, effect_by_effect
+from msfp_gen.specification.friction_laws import BUILT_IN, law_of
+from msfp_gen.studies.accuracy.effect_by_effect import Outcome, _change, _states, effect_by_effect, simpler_laws
 
 SCENE = replace(load_scene("fenz-test2"), duration=4.0)
 
@@ -19,6 +23,15 @@ class Bare(OtherSystem):
 
     def start(self, **options):
         raise AssertionError(options)
+
+
+def outcome(values, **limits):
+    """A made-up run: two values of a quantity, and limits of 1 with what was reached."""
+    readings = {
+        name: Reading(Limit(name, name, "N", lambda *_: ()), 0, "", Value(0, None, reached, 1.0))
+        for name, reached in limits.items()
+    }
+    return Outcome({"a": np.array(values)}, readings, 1.0)
 
 
 def test_changes_are_differences_of_runs():
@@ -50,15 +63,24 @@ def test_a_limit_at_the_value_is_undecided():
 
 def test_limits_that_an_effect_crosses_are_named():
     noise = {"force": 0.1, "gap": 0.1}
-    base = Outcome({"a_1": 2.0, "a_2": 4.0}, {"force": (0.5, 1.0), "gap": (3.0, 1.0)}, 1.0)
-    crossing = Outcome({"a_1": 3.0, "a_2": 4.2}, {"force": (1.5, 1.0), "gap": (1.05, 1.0)}, 2.0)
+    base = outcome([2.0, 4.0], force=0.5, gap=3.0)
+    crossing = outcome([3.0, 4.2], force=1.5, gap=1.05)
     found = _change("rims", "on", "off", base, crossing, _states(base, noise), _states(crossing, noise))
-    assert (
-        found.limits == {"force": "exceeded", "gap": "undecided"} and found.decides == "force exceeded, gap undecided"
-    )
-    assert found.changes == {"a": 0.25} and found.cost == 2.0
+    assert found.limits == {"force": "exceeded", "gap": "undecided"}
+    assert found.decides == "force exceeded, gap undecided"
+    assert found.changes == {"a": 0.25} and found.cost == 1.0
     alike = _change("rims", "on", "off", base, base, _states(base, noise), _states(base, noise))
     assert alike.decides == "same" and alike.changes == {"a": 0.0}
+    lost = _change("rims", "on", "off", base, outcome([nan, 4.0]), {}, {})
+    assert not isfinite(lost.changes["a"])
+    at_limit = outcome([1.0], force=1.0 + 1e-12)  # as the verdict: within, by rounding
+    assert not at_limit.limits["force"].exceeded and _states(at_limit, {}) == {"force": "within"}
+
+
+def test_friction_is_simplified_by_what_a_law_takes():
+    assert simpler_laws(BUILT_IN["pvt"]) == ["pv", "constant"]
+    assert simpler_laws(BUILT_IN["pv"]) == simpler_laws(BUILT_IN["velocity"]) == ["constant"]
+    assert simpler_laws(law_of("custom", "mu * (1 - c1 * exp(-c2 * v))")) == ["constant"] and simpler_laws(None) == []
 
 
 def test_an_effect_that_cannot_act_says_why():

@@ -15,13 +15,12 @@ import numpy as np
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
+from msfp_gen.design.effective import Effective, effective
 from msfp_gen.motions.records.scaling import tabulated_spectrum
-from msfp_gen.scene.effective import Effective, effective
 from msfp_gen.scene.fidelity import Backbone
 
 Pairs = Sequence[tuple[float, float]]
 POINTS = 400  # displacements among which the largest solution is looked for
-HALVINGS = 60
 
 
 def _interpolated(pairs: Pairs) -> Callable[[float], float]:
@@ -97,6 +96,7 @@ def equivalent(backbone: Backbone, spectrum: Pairs, factor: Callable[[float], fl
     Raises:
         InputError: the displacement is beyond the last rim, or the effective period beyond the spectrum.
     """
+    from scipy.optimize import brentq
 
     def tried(displacement: float) -> tuple[float, Equivalent]:
         at = effective(backbone, displacement, gravity)
@@ -123,14 +123,7 @@ def equivalent(backbone: Backbone, spectrum: Pairs, factor: Callable[[float], fl
         high = float(low)
     else:
         raise InputError(f"spectrum: it moves the bearing by less than {high * 1e3:.4g} mm, so the mass stays stuck")
-    least = float(low)
-    for _ in range(HALVINGS):
-        middle = (least + high) / 2
-        if tried(middle)[0] >= 0:
-            least = middle
-        else:
-            high = middle
-    return tried(least)[1]
+    return tried(brentq(lambda displacement: tried(displacement)[0], float(low), high, xtol=1e-12 * capacity))[1]
 
 
 def total_displacement(

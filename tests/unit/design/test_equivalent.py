@@ -11,8 +11,8 @@ import pytest
 
 from msfp_gen import Bearing, InputError, load_scene, simulate
 from msfp_gen.cli import main
-from msfp_gen.scene.effective import published_backbone
-from msfp_gen.scene.equivalent import DAMPING, damping_of, damping_table, equivalent, total_displacement
+from msfp_gen.design.effective import published_backbone
+from msfp_gen.design.equivalent import DAMPING, damping_of, damping_table, equivalent, total_displacement
 
 SINGLE: dict[str, Any] = {
     "device": "single", "radius": [2.2], "height": [0.0], "friction": [0.06], "slider_diameter": [0.24],

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 from msfp_gen.common.tables import Table
+from msfp_gen.design.effective import Effective, characteristic, effective, published_backbone, regimes
 from msfp_gen.scene.bearing import Bearing
-from msfp_gen.scene.effective import Effective, characteristic, effective, published_backbone, regimes
 from msfp_gen.scene.explain import body_table
 from msfp_gen.scene.fidelity import Backbone
 from msfp_gen.scene.sheet import Sheet
