@@ -65,7 +65,7 @@ def end_kernels(equations: Equations) -> tuple[Kernel, ...]:
     """Derivatives of the programs of the condensed equations and of a two-port by the motion of its ends."""
     effects = equations.spec.effects
     scheduled = _kernels(equations, {**condensed(effects), **two_port(effects)}, ends.by_ends)
-    return (*scheduled, *ends.outside(equations.programs))
+    return (*scheduled, *ends.port_kernels(equations.programs))
 
 
 def _kernels(

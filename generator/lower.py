@@ -200,22 +200,22 @@ def _with_all_inputs(use: Use) -> Use:
     return replace(use, active=frozenset(field.name for field in use.block.fields), moving=True)
 
 
-def directional(program: Program, at_hand: bool) -> Program:
-    """The program with all inputs active and every result differentiated; at_hand: as of `differentiated`."""
+def directional(program: Program, output_is_stored: bool) -> Program:
+    """The program with all inputs active and every result differentiated; output_is_stored: as of `differentiated`."""
     inputs = [_with_all_inputs(use) for use in program.inputs]
-    return differentiated(program, "direction", inputs, frozenset(program.results), "MSFP_COLUMNS", at_hand)
+    return differentiated(program, "direction", inputs, frozenset(program.results), "MSFP_COLUMNS", output_is_stored)
 
 
 def differentiated(
-    program: Program, name: str, inputs: list[Use], tangents: frozenset[str], columns: str, at_hand: bool
+    program: Program, name: str, inputs: list[Use], tangents: frozenset[str], columns: str, output_is_stored: bool
 ) -> Program:
     """The derivatives of a program, as one of another name, with other inputs active and other results differentiated.
 
-    at_hand: the results themselves are read, as a block `out`, where the derivatives contain them.
+    output_is_stored: the results themselves are read, as a block `out`, where the derivatives contain them.
     """
     assert program.output is not None
     names: dict[sp.Expr, sp.Expr] = {}
-    if at_hand:
+    if output_is_stored:
         inputs = [*inputs, program.output]
         computed = {statement.target for statement in program.statements}
         for field, result in program.results.items():

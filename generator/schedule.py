@@ -405,9 +405,9 @@ def condensed(effects: Effects) -> Schedule:
     moved = "w->contact[j], d->stage[j], d->contact_frame[j], d->contact[j]"
     summed = Call("interface_force", ("body_parameters[j+1]", "body[j+1]", "force[j+1]"), ("force[j]",))
     contact = InC(
-        "msfp_contacts(p, w, s->seed, s->g, s->jacobians ? s->jacobians->contact : NULL)",
+        "msfp_contacts(p, w, s->weights, s->g, s->jacobians ? s->jacobians->contact : NULL)",
         "msfp_contact_tangents(w, ds->contact_frame, ds->contact)",
-        "msfp_contact_columns(p, dp, w, ds->point, ds->slopes, s->seed, ds->all, d)",
+        "msfp_contact_columns(p, dp, w, ds->point, ds->slopes, s->weights, ds->all, d)",
         f"for (int j = 0; j < MSFP_NB; ++j) msfp_contact_by_ends({values}, {moved})",
         fails=True,
     )

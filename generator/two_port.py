@@ -150,25 +150,25 @@ def moving(blocks: Blocks) -> Iterator[tuple[str, str]]:
         yield from ((name, field) for field in fields_of(block, _moving_of(block)))
 
 
-def by_ends(program: Program, at_hand: bool) -> Program:
-    """The derivatives of a program by the motion of the ends; at_hand: as of `lower.differentiated`."""
+def by_ends(program: Program, output_is_stored: bool) -> Program:
+    """The derivatives of a program by the motion of the ends; output_is_stored: as of `lower.differentiated`."""
     results = program.tangents or frozenset(program.results)
     if program.name == "contact":
         assert program.output is not None
         names = [name for name in CONTACT if name in program.output.block.quantities]
         results = frozenset(fields_of(program.output.block, names))
-    return differentiated(program, "by_ends", [_moves(use) for use in program.inputs], results, WIDTH, at_hand)
+    return differentiated(program, "by_ends", [_moves(use) for use in program.inputs], results, WIDTH, output_is_stored)
 
 
-def outside(every: Iterable[Program]) -> Iterator[Kernel]:
+def port_kernels(every: Iterable[Program]) -> Iterator[Kernel]:
     """The derivatives of the programs that C calls itself."""
     for program in every:
         if program.name == "contact":
-            yield eliminated(by_ends(program, at_hand=True))
+            yield eliminated(by_ends(program, output_is_stored=True))
         elif program.name == "foot":
-            yield lower(by_ends(program, at_hand=True))
+            yield lower(by_ends(program, output_is_stored=True))
         elif program.name == "rotation_angles":
-            every_angle = by_ends(program, at_hand=False)
+            every_angle = by_ends(program, output_is_stored=False)
             yield lower(every_angle)
             yield lower(replace(every_angle, name="support_angles_by_ends", tangents=SUPPORT))
 

@@ -30,7 +30,7 @@ static void numbers(double *out, size_t count)
 
 static msfp_parameters parameters;
 static msfp_point at;
-static msfp_seed seed;
+static msfp_stage_weights weights;
 static msfp_work work;
 static double residual[DOF], tangent[DOF * DOF], sink;
 
@@ -40,7 +40,7 @@ static int value(void)
 {
     double f[NB][2];
     start(f);
-    const int status = msfp_condensed(&parameters, &at, &seed, &work, f, residual, NULL);
+    const int status = msfp_condensed(&parameters, &at, &weights, &work, f, residual, NULL);
     sink += residual[0];
     return status;
 }
@@ -50,7 +50,7 @@ static int newton(void)
     double f[NB][2];
     int pivots[DOF];
     start(f);
-    int status = msfp_condensed(&parameters, &at, &seed, &work, f, residual, tangent);
+    int status = msfp_condensed(&parameters, &at, &weights, &work, f, residual, tangent);
     status += msfp_lu(tangent, DOF, pivots) == 0;
     msfp_lu_solve(tangent, DOF, pivots, residual);
     sink += residual[0];
@@ -61,7 +61,7 @@ static int tangents(void)
 {
     double f[NB][2];
     start(f);
-    const int status = msfp_condensed(&parameters, &at, &seed, &work, f, residual, tangent);
+    const int status = msfp_condensed(&parameters, &at, &weights, &work, f, residual, tangent);
     sink += tangent[0];
     return status;
 }
@@ -116,11 +116,11 @@ int main(int argc, char **argv)
         memcpy(at.v[k], state[1][k], sizeof state[1][k]);
         memcpy(at.a[k], state[2][k], sizeof state[2][k]);
     }
-    seed.q_weight = seed.beta = head[0];
-    seed.v_weight = 1.0;
-    seed.a_weight = 1.0 / head[0];
-    seed.accuracy = 1e-8;
-    memcpy(seed.fp, at.f, sizeof seed.fp);
+    weights.q_weight = weights.beta = head[0];
+    weights.v_weight = 1.0;
+    weights.a_weight = 1.0 / head[0];
+    weights.accuracy = 1e-8;
+    memcpy(weights.fp, at.f, sizeof weights.fp);
     int (*const all[])(void) = { value, tangents, newton, accelerations };
     if (argc > 2)
         return repeated(all[atoi(argv[2])], count);

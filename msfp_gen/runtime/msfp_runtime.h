@@ -112,7 +112,7 @@ typedef struct {
     int closed_form; /* Y is a function of the slip of the whole step, and fp is not used */
     double slip[MSFP_NB][MSFP_SLIP_SIZE];
 #endif
-} msfp_seed;
+} msfp_stage_weights;
 
 /* Rates of the states of a surface: dY/dt, dZ/dt, and the source of a memory. */
 #define MSFP_SURFACE_RATES (MSFP_SHEAR_SIZE + (MSFP_MEMORY > 0))
@@ -161,7 +161,7 @@ typedef struct {
  * down and the contact in closed form; with uplift also the linear balances [N]. tangent: [MSFP_DOF][MSFP_DOF], or
  * NULL. g: first guess of the friction force over -mu N, f + T df/dt, on return its value. Returns MSFP_OK or a
  * status. */
-int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_stage_weights *weights, msfp_work *w,
                    double g[MSFP_NB][2], double *residual, double *tangent);
 
 typedef struct {

@@ -361,7 +361,7 @@ INTENSITY = "intensity"  # column of the intensity measure of [records]
 
 
 @dataclass(frozen=True)
-class Recipe:
+class StudyInputs:
     """All that a worker needs to make the scenes of a study; small, since it is sent to every worker.
 
     Attributes:
@@ -396,26 +396,26 @@ class SceneFactory:
     A motion that no axis changes is read once. The reader of scene files caches other motions and frames of buildings.
 
     Attributes:
-        recipe: of the study.
+        inputs: of the study.
         base: the base scene, at full fidelity.
     """
 
-    def __init__(self, recipe: Recipe) -> None:
-        self.recipe = recipe
-        self._changed = {path.partition(".")[0] for axis in recipe.axes for path in axis.paths}
-        self._fidelity = recipe.scene.get("fidelity", "exact")
-        base = {key: value for key, value in recipe.scene.items() if key != "fidelity"}
+    def __init__(self, inputs: StudyInputs) -> None:
+        self.inputs = inputs
+        self._changed = {path.partition(".")[0] for axis in inputs.axes for path in axis.paths}
+        self._fidelity = inputs.scene.get("fidelity", "exact")
+        base = {key: value for key, value in inputs.scene.items() if key != "fidelity"}
         self.base = scene_of(base)
         at_fidelity(self.base, self._fidelity)  # raises its errors
         self._check_motions(self.base)
         self._set_paths = sorted(  # (depth, index of the axis, path): a table is set before its fields
             (len(keys_of(path)), index, path)
-            for index, axis in enumerate(recipe.axes)
+            for index, axis in enumerate(inputs.axes)
             for path in axis.paths
             if axis.change == "sets"
         )
         self._fixed: Table = {}  # parts of every scene that are read already
-        if not recipe.records and "motion" not in self._changed:
+        if not inputs.records and "motion" not in self._changed:
             self._fixed["motion"] = self.base.motion
             if hasattr(self.base, "motion_table"):
                 self._fixed["motion_table"] = self.base.motion_table
@@ -423,7 +423,7 @@ class SceneFactory:
 
     def scene(self, values: Sequence[Any]) -> System:
         """The scene of a run. values: one for each axis, in the order of the axes. Raises InputError."""
-        axes, table = self.recipe.axes, self._table
+        axes, table = self.inputs.axes, self._table
         for _, index, path in self._set_paths:
             table = changed_table(table, {path: values[index]}, axes[index].surfaces)
         pairs = list(zip(axes, values, strict=True))
@@ -437,7 +437,7 @@ class SceneFactory:
         scene = scene_of({key: value for key, value in table.items() if key != "fidelity"}, **self._fixed)
         for axis, value in pairs:
             if axis.change == "factors":
-                scene = bounded_scene(scene, self.recipe.factors[axis.paths[0]], value)
+                scene = bounded_scene(scene, self.inputs.factors[axis.paths[0]], value)
         self._check_motions(scene)
         reduced: System = at_fidelity(scene, level)
         return reduced
@@ -446,7 +446,7 @@ class SceneFactory:
         """Raise InputError where bearings of a building have motions of their own, which the study does not change."""
         mounts = getattr(scene, "bearings", ())
         own = [index for index, mount in enumerate(mounts) if mount.motion is not None]
-        if own and self.recipe.records:
+        if own and self.inputs.records:
             what = "records and their scales give the motion of the scene"
         elif own and len(own) == len(mounts) and "motion" in self._changed:
             what = "no bearing is left on the motion of the scene, which the study changes"
@@ -459,7 +459,7 @@ class SceneFactory:
 
     def _scaled(self, name: str, factor: float) -> Table:
         """The `[motion]` table of a record times a factor."""
-        table = self.recipe.records[name]
+        table = self.inputs.records[name]
         if not factor > 0:
             raise InputError(f"scale = {factor:g}: give a number above 0")
         if factor == 1.0:

@@ -32,9 +32,9 @@ from msfp_gen.studies.axes import (
     INTENSITY,
     Axis,
     Distribution,
-    Recipe,
     Sampling,
     SceneFactory,
+    StudyInputs,
     axis_from,
     grid,
     motion_of,
@@ -131,7 +131,7 @@ class Study:
 
     Attributes:
         name: a label.
-        recipe: base scene, axes and records.
+        inputs: base scene, axes and records.
         sampling: how the random axes are drawn; None for a study without random axes.
         keep: the columns of each run.
         limits: of a run and of the study.
@@ -143,7 +143,7 @@ class Study:
     """
 
     name: str
-    recipe: Recipe
+    inputs: StudyInputs
     sampling: Sampling | None
     keep: Keep
     limits: Limits
@@ -156,7 +156,7 @@ class Study:
     @property
     def axes(self) -> tuple[Axis, ...]:
         """The axes, in the order of the columns of the table."""
-        return self.recipe.axes
+        return self.inputs.axes
 
     @property
     def distributions(self) -> list[Distribution]:
@@ -217,7 +217,7 @@ class Study:
         number, row = divmod(run - 1, self.chunk)
         values, _ = self.task(number).rows(self.axes)[row]
         with expecting(self.files):
-            scene = SceneFactory(self.recipe).scene(values)
+            scene = SceneFactory(self.inputs).scene(values)
         return replace(scene, name=f"{self.name or 'study'}, run {run}")
 
 
@@ -234,10 +234,10 @@ def check_study(study: Study) -> Study:
         raise InputError(f"sampling.cells has {study.cells.max() + 1}: the axes have {prod(study.grid)} combinations")
     with recording() as read:
         with prefixed("scene: "):
-            factory = SceneFactory(study.recipe)
+            factory = SceneFactory(study.inputs)
         for axis in study.axes:
             with prefixed(f"axes.{axis.name}."):
-                _check_axis(axis, factory, bool(study.recipe.records))
+                _check_axis(axis, factory, bool(study.inputs.records))
         sources: dict[str, Source] = {}
         columns: dict[str, None] = {}
         first, base, opened = {}, "", {}
@@ -252,7 +252,7 @@ def check_study(study: Study) -> Study:
         kept = study.keep.names if "keep" in study.table else usual_names(sources)
         keep = replace(study.keep, names=kept, sources=tuple(sources.items()), history=tuple(columns))
         study = replace(study, keep=keep, files=read, base=base, opened=opened)
-    reserved = [INTENSITY] if study.recipe.intensities else []
+    reserved = [INTENSITY] if study.inputs.intensities else []
     names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in study.keep.columns)]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InputError(f"{twice[0]}: this name occurs twice among axes, keep and quantities; give another")
@@ -266,7 +266,7 @@ def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:
             raise InputError(f"{axis.change} = {path!r}: [records] gives the motion; change it there")
         try:
             if axis.change == "multiplies" or axis.surfaces is not None:
-                multiplied_table(factory.recipe.scene, path, 1.0, axis.surfaces)
+                multiplied_table(factory.inputs.scene, path, 1.0, axis.surfaces)
         except InputError as error:
             raise InputError(f"{axis.change} = {path!r}: {str(error).removeprefix(f'{path}: ')}") from None
     count = min(len(bearing.surfaces) for bearing in factory.base.every_bearing)
@@ -447,7 +447,7 @@ def _checked_study(table: Mapping[str, Any], folder: Path | None, progress: Prog
     return check_study(
         Study(
             name=str(table.get("name", "")),
-            recipe=Recipe(scene, axes, tables, factors, intensities),
+            inputs=StudyInputs(scene, axes, tables, factors, intensities),
             sampling=sampling,
             keep=keep,
             limits=Limits(**fields_of(table, "limits", Limits)),

@@ -31,7 +31,7 @@ from msfp_gen.common.tables import Table, parquet_bytes
 from msfp_gen.common.version import __version__
 from msfp_gen.jit.cache import digest_sources
 from msfp_gen.scene.file.loader import dumps, toml_file
-from msfp_gen.studies.axes import INTENSITY, Recipe, SceneFactory
+from msfp_gen.studies.axes import INTENSITY, SceneFactory, StudyInputs
 from msfp_gen.studies.batch import (
     BAD_INPUT,
     ENDED,
@@ -129,9 +129,9 @@ def run_on(
         progress(before, total)
     done = 0
     timed = "draws" in study.table.get("accuracy", {})
-    common = study.recipe, study.files, study.keep, study.limits.run_seconds
-    order = Order(chunks.identity, chunks.digest, *common, timed)
-    calls = ((task, (order, task)) for task in map(study.task, missing))
+    common = study.inputs, study.files, study.keep, study.limits.run_seconds
+    job = ChunkJob(chunks.identity, chunks.digest, *common, timed)
+    calls = ((task, (job, task)) for task in map(study.task, missing))
     for task, (part, bad) in pool.results(run_chunk, calls):
         write_bytes(chunks.path(task), [part], tidy=False)
         done, failed = done + len(task), failed + bad
@@ -168,7 +168,7 @@ def _check_failures(study: Study, failed: int, done: int, folder: Path) -> None:
         )
 
 
-class Order(NamedTuple):
+class ChunkJob(NamedTuple):
     """All that a worker needs for any chunk of a study.
 
     identity, digest: as of `Chunks`. files: path -> sha256 of the files that the scenes open. timed: whether a part
@@ -177,7 +177,7 @@ class Order(NamedTuple):
 
     identity: str
     digest: str
-    recipe: Recipe
+    inputs: StudyInputs
     files: Files
     keep: Keep
     run_seconds: float | None
@@ -187,57 +187,57 @@ class Order(NamedTuple):
 _factories: dict[str, SceneFactory] = {}  # identity of a study -> its factory; of the last study only
 
 
-def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
+def run_chunk(job: ChunkJob, task: Task) -> tuple[bytes, int]:
     """Run a chunk in a worker; returns its part as the bytes of a Parquet file, and the number of failed runs.
 
     Raises ChangedFileError where a file has changed since the study was checked.
     """
-    with expecting(order.files):
-        factory = _factories.get(order.identity)
+    with expecting(job.files):
+        factory = _factories.get(job.identity)
         if factory is None:
-            factory = SceneFactory(order.recipe)
+            factory = SceneFactory(job.inputs)
             _factories.clear()
-            _factories[order.identity] = factory
+            _factories[job.identity] = factory
         begin = time.thread_time()
-        axes = order.recipe.axes
+        axes = job.inputs.axes
         rows = []
         for offset, (values, labels) in enumerate(task.rows(axes), start=1):
             at = {axis.name: label for axis, label in zip(axes, labels, strict=True)}
-            intensity = order.recipe.intensity(at)
+            intensity = job.inputs.intensity(at)
             numbers = {**{axis.name: at[axis.name] for axis in axes if axis.numeric}, **intensity}
-            status, message, columns = _row(partial(factory.scene, values), order, numbers)
+            status, message, columns = _row(partial(factory.scene, values), job, numbers)
             about = {"run": task.first + offset, **at, "status": status, "message": message}
             rows.append({**about, **intensity, **columns})
     failed = sum(row["status"] not in ENDED for row in rows)
     seconds = time.thread_time() - begin
-    return _part(order, rows, failed, {"seconds": f"{seconds:.4g}"} if order.timed else {}), failed
+    return _part(job, rows, failed, {"seconds": f"{seconds:.4g}"} if job.timed else {}), failed
 
 
-def _row(make: Callable[[], System], order: Order, at: dict[str, float]) -> tuple[str, str, dict[str, Any]]:
+def _row(make: Callable[[], System], job: ChunkJob, at: dict[str, float]) -> tuple[str, str, dict[str, Any]]:
     """Status, message and kept columns of one run. make: makes its scene. at: numbers of the axes, for formulas."""
     try:
         scene = make()
         check_method(scene)
-        result = run_to_end(scene, seconds=order.run_seconds)
+        result = run_to_end(scene, seconds=job.run_seconds)
     except InputError as error:
         return BAD_INPUT, str(error), {}
     except RunError as error:  # a run without rows, or out of time: its rows would depend on the computer
         remedy = "; see limits.run_seconds" if error.status == OUT_OF_TIME else ""
         return error.status, f"{error}{remedy}", {}
-    columns, problem = order.keep.values(result, at)
+    columns, problem = job.keep.values(result, at)
     return result.status, result.message or problem, columns
 
 
-def _part(order: Order, rows: list[dict[str, Any]], failed: int, more: dict[str, str]) -> bytes:
+def _part(job: ChunkJob, rows: list[dict[str, Any]], failed: int, more: dict[str, str]) -> bytes:
     """A part as bytes. Its columns: run, axes, status, message, intensity, kept quantities. more: metadata."""
-    axes = [Column(axis.name, "", not axis.numeric) for axis in order.recipe.axes]
-    intensity = [Column(INTENSITY, "m/s^2")] if order.recipe.intensities else []
+    axes = [Column(axis.name, "", not axis.numeric) for axis in job.inputs.axes]
+    intensity = [Column(INTENSITY, "m/s^2")] if job.inputs.intensities else []
     texts = [Column("status", "", text=True), Column("message", "", text=True)]
-    columns = [*axes, *texts, *intensity, *order.keep.columns]
+    columns = [*axes, *texts, *intensity, *job.keep.columns]
     types = {"run": "int64", **{name: "string" if text else "double" for name, _, text in columns}}
     values = {(name, unit): [row.get(name) for row in rows] for name, unit, _ in (Column("run", ""), *columns)}
-    sides = {name: order.keep.side(name) for name in order.keep.numbers}
-    about = {"digest": order.digest, "failed": str(failed), "sides": json.dumps(sides), **more}
+    sides = {name: job.keep.side(name) for name in job.keep.numbers}
+    about = {"digest": job.digest, "failed": str(failed), "sides": json.dumps(sides), **more}
     return parquet_bytes(values, types, about)
 
 
@@ -275,9 +275,9 @@ class Chunks:
             "format": FORMAT,
             "version": __version__,
             "equations": digest_sources(),
-            "scene": study.recipe.scene,
+            "scene": study.inputs.scene,
             "base": study.base,
-            "factors": study.recipe.factors,
+            "factors": study.inputs.factors,
             "axes": [(axis.name, axis.change, axis.paths, axis.surfaces, axis.random) for axis in study.axes],
             "keep": [study.keep.names, study.keep.formulas, sorted(study.keep.known)],
             "intensity": study.table.get("records", {}).get("intensity"),
@@ -293,7 +293,7 @@ class Chunks:
             if axis.values is None:
                 continue
             contents = [
-                (study.recipe.records[value] if axis.change == "record" else value, label, study.opened.get((index, k)))
+                (study.inputs.records[value] if axis.change == "record" else value, label, study.opened.get((index, k)))
                 for k, (value, label) in enumerate(zip(axis.values, axis.labels, strict=True))
             ]
             digests = [bytes.fromhex(fingerprint(value, study.files))[:16] for value in contents]

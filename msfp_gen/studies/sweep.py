@@ -20,7 +20,7 @@ from msfp_gen.scene.file.changes import keys_of
 from msfp_gen.scene.file.loader import scene_table
 from msfp_gen.scene.file.source import with_absolute_paths
 from msfp_gen.scene.system import System
-from msfp_gen.studies.axes import Axis, Recipe, SceneFactory, located, motion_of
+from msfp_gen.studies.axes import Axis, SceneFactory, StudyInputs, located, motion_of
 from msfp_gen.studies.columns import plain_cell
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def variations(
     with prefixed("" if file is None else f"{file}: "):
         axes = [located(axis, folder) for axis in axes]
         scene = with_absolute_paths(table if not records else {**table, "motion": motion_of(records[0].table)}, folder)
-        factory = SceneFactory(Recipe(scene, tuple(axes), tables, {}, {}))
+        factory = SceneFactory(StudyInputs(scene, tuple(axes), tables, {}, {}))
         scenes = []
         for given, values in zip(product(*lists), product(*(axis.values or () for axis in axes)), strict=True):
             run, varied = factory.scene(values), {axis.name: value for axis, value in zip(axes, given, strict=True)}

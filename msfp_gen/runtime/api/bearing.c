@@ -141,7 +141,7 @@ int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, doubl
 {
     msfp_point point;
     msfp_work w;
-    msfp_seed seed = { 0 };
+    msfp_stage_weights weights = { 0 };
     double g[NB][2], rest[MSFP_DOF];
     const double factors[] = { q_weight, v_weight, a_weight, beta, gain };
     int status = point_of(bearing, at, &point);
@@ -156,10 +156,10 @@ int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, doubl
     point.gain = gain;
 #endif
     point.foot_beta = beta;
-    seed.q_weight = q_weight, seed.v_weight = v_weight, seed.a_weight = a_weight, seed.beta = beta;
-    memcpy(seed.fp, point.f, sizeof seed.fp);
+    weights.q_weight = q_weight, weights.v_weight = v_weight, weights.a_weight = a_weight, weights.beta = beta;
+    memcpy(weights.fp, point.f, sizeof weights.fp);
     memcpy(g, point.f, sizeof g);
-    status = msfp_condensed(&bearing->parameters, &point, &seed, &w, g, residual ? residual : rest, tangent);
+    status = msfp_condensed(&bearing->parameters, &point, &weights, &w, g, residual ? residual : rest, tangent);
     msfp_friction_state(&w, g);
     status = first(status, give(found, g, sizeof g));
     return msfp_all_finite(residual, MSFP_DOF) && msfp_all_finite(tangent, MSFP_DOF * MSFP_DOF) ? status

@@ -11,14 +11,14 @@
 
 static const int unknown[ND] = MSFP_FREE;
 
-MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                             double g[MSFP_NB][2], double *residual, double *tangent)
+MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_stage_weights *weights,
+                             msfp_work *w, double g[MSFP_NB][2], double *residual, double *tangent)
 {
     msfp_blocks s;
     s.g = g;
     s.jacobians = tangent ? &w->jacobians : NULL;
-    msfp_set_inputs(p, at, seed, w, &s);
-    if (!seed->same_base)
+    msfp_set_inputs(p, at, weights, w, &s);
+    if (!weights->same_base)
         msfp_base_values(p, w, &s);
     msfp_bodies_values(p, w, &s);
     msfp_top_values(p, w, &s);
@@ -38,7 +38,7 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
         w->lock[j][MSFP_LOCK_MOMENT] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? 0.0 : s.angular[j + 1][MSFP_ANGULAR_SIZE - 1];
     }
     if (tangent)
-        msfp_tangent(p, at, seed, w, tangent);
+        msfp_tangent(p, at, weights, w, tangent);
     return MSFP_OK;
 }
 
@@ -122,16 +122,16 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
 {
     double residual[DOF], tangent[DOF * DOF], g[NB][2], last = INFINITY;
     int pivots[DOF], worst;
-    msfp_seed seed = { .a_weight = 1.0 };
-    memcpy(seed.fp, at->f, sizeof seed.fp);
+    msfp_stage_weights weights = { .a_weight = 1.0 };
+    memcpy(weights.fp, at->f, sizeof weights.fp);
     memcpy(g, at->f, sizeof g);
     out->determinant = 1;
     for (out->iterations = 0; out->iterations < 50; ++out->iterations) {
         const int first = out->iterations == 0;
-        int status = msfp_condensed(p, at, &seed, w, g, residual, first ? tangent : NULL);
+        int status = msfp_condensed(p, at, &weights, w, g, residual, first ? tangent : NULL);
         if (status)
             return status;
-        seed.same_base = 1;
+        weights.same_base = 1;
         out->residual = msfp_residual_size(p, w, residual, &worst);
         if (!(out->residual < INFINITY))
             return MSFP_E_FINITE;
@@ -140,7 +140,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
             return MSFP_OK;
         const int good = out->residual < 1e-2 * last;
         last = out->residual;
-        if (!first && !good && (status = msfp_condensed(p, at, &seed, w, g, residual, tangent)))
+        if (!first && !good && (status = msfp_condensed(p, at, &weights, w, g, residual, tangent)))
             return status;
         if (first || !good) {
             out->determinant = msfp_lu(tangent, DOF, pivots);

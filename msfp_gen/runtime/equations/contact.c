@@ -222,7 +222,7 @@ MSFP_INLINE int jacobian_row(int r) { return r < MOMENT ? r : r == MOMENT ? MOME
 #if MSFP_CLOSED_FORM
 /* Y of all surfaces after the slip of the step, with their blocks `stage`, and their contacts; slope: dg/d(angular velocity of the body)
  * [s/rad], or NULL. */
-MSFP_INLINE int closed_form_stage(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, lanes *all,
+MSFP_INLINE int closed_form_stage(const msfp_parameters *p, msfp_work *w, const msfp_stage_weights *weights, lanes *all,
                                   double *slope)
 {
     static const double unit[INPUTS] = { [MSFP_CONTACT_FRAME_DWY] = 1.0 };
@@ -231,10 +231,10 @@ MSFP_INLINE int closed_form_stage(const msfp_parameters *p, msfp_work *w, const 
         const int j = s < NB ? s : NB - 1;
         double slid[MSFP_SLID_SIZE], slopes[MSFP_SLID_SIZE];
         if (slope) {
-            msfp_slid_friction_tangent(p->surface[j], seed->slip[j], w->contact_frame[j], slid, unit, slopes);
+            msfp_slid_friction_tangent(p->surface[j], weights->slip[j], w->contact_frame[j], slid, unit, slopes);
             slope[s] = slopes[MSFP_SLID_G];
         } else
-            msfp_slid_friction(p->surface[j], seed->slip[j], w->contact_frame[j], slid);
+            msfp_slid_friction(p->surface[j], weights->slip[j], w->contact_frame[j], slid);
         all->g[s] = slid[MSFP_SLID_G];
         w->stage[j][MSFP_STAGE_Y] = slid[MSFP_SLID_Y]; /* the kernel leaves Y as it is, and gives its rate */
         w->stage[j][MSFP_STAGE_TAU] = p->surface[j][MSFP_SURFACE_PARAMETERS_TD];
@@ -315,22 +315,22 @@ MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
     }
 }
 
-MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[NB][2],
+MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_stage_weights *weights, double g[NB][2],
                             double *condensed)
 {
     lanes all;
     gather(w, g, &all);
 #if MSFP_CLOSED_FORM
-    if (seed->closed_form) {
+    if (weights->closed_form) {
         double slope[LANES];
-        const int status = closed_form_stage(p, w, seed, &all, condensed ? slope : NULL);
+        const int status = closed_form_stage(p, w, weights, &all, condensed ? slope : NULL);
         if (status == MSFP_OK && condensed)
             condense_closed_form(&p->lanes[0][0], &all, slope, condensed);
         scatter(&all, w, g);
         return status;
     }
 #endif
-    const int status = friction_stage(&p->lanes[0][0], &all, seed->beta, fmax(seed->accuracy, 1e-12));
+    const int status = friction_stage(&p->lanes[0][0], &all, weights->beta, fmax(weights->accuracy, 1e-12));
     if (status == MSFP_OK && condensed)
         condense(&p->lanes[0][0], &all, condensed);
     scatter(&all, w, g);

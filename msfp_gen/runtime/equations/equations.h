@@ -60,8 +60,8 @@ static inline int msfp_slider(int j)
 }
 
 /* Inputs of an evaluation: coordinates, motion of the base unless it is the same as in `w`, loads, friction and
- * memories. seed: NULL outside of a step. */
-void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+ * memories. weights: NULL outside of a step. */
+void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, const msfp_stage_weights *weights, msfp_work *w,
                      msfp_blocks *s);
 /* The inertial frame at r_01 (3.1) as the block of a body, the parent of body 0. */
 void msfp_inertial_frame(const msfp_point *at, double *body);
@@ -108,7 +108,7 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
 
 /* Y, Z and the contact of all surfaces; g as of msfp_condensed. condensed: Jacobian [MSFP_CONTACT_ROWS] with respect to the
  * inputs of a surface, with g (and mu) eliminated, lane by lane; or NULL. Returns a status. */
-int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[MSFP_NB][2],
+int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_stage_weights *weights, double g[MSFP_NB][2],
                   double *condensed);
 /* Columns of the moments and of N from those of the inputs of the contacts, by that Jacobian, which is in `w`; in models
  * with gradients also `drates` of `w`. */
@@ -129,7 +129,7 @@ double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const do
 /* Of tangent.c in all models: columns of force and moment at the top at a given load, from those of the top plate: all in `w`. */
 void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 /* Tangent [MSFP_DOF][MSFP_DOF] of the condensed equations at the evaluation in `w`. */
-void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_stage_weights *weights, msfp_work *w,
                   double *tangent);
 /* After it: derivatives [MSFP_DOF][MSFP_DOF] of the same equations with respect to force and moment at the top, for
  * given columns of these: dforce [MSFP_FORCE_SIZE][MSFP_DOF], dmoment [MSFP_MOMENT_SIZE][MSFP_DOF]. The columns in `w`
@@ -148,8 +148,8 @@ double msfp_heating(const msfp_parameters *p, const msfp_work *w, int j);
 /* Kinetic and potential energy and that of all springs but friction [J]. */
 double msfp_stored_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,
                           const msfp_mechanical *mechanical);
-/* Evaluate the equations at a state outside of a step; fills seed and g, the friction force over -mu N. */
-void msfp_evaluate_state(const msfp_parameters *p, const msfp_point *at, msfp_seed *seed, msfp_work *w,
+/* Evaluate the equations at a state outside of a step; fills weights and g, the friction force over -mu N. */
+void msfp_evaluate_state(const msfp_parameters *p, const msfp_point *at, msfp_stage_weights *weights, msfp_work *w,
                          double g[MSFP_NB][2]);
 /* Fill a row from the evaluation in `w`. */
 void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_mechanical *mechanical,

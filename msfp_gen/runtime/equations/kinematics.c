@@ -89,12 +89,12 @@ void msfp_set_loads(const msfp_parameters *p, const msfp_point *at, msfp_blocks 
 #endif
 }
 
-MSFP_WIDE void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                               msfp_blocks *s)
+MSFP_WIDE void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, const msfp_stage_weights *weights,
+                               msfp_work *w, msfp_blocks *s)
 {
     s->at = at;
-    s->seed = seed;
-    if (!(seed && seed->same_base)) {
+    s->weights = weights;
+    if (!(weights && weights->same_base)) {
         msfp_inertial_frame(at, s->frame);
         load_coordinates(w->x[0], at->base[0] + 3, at->base[1] + 3, at->base[2] + 3, 0);
     }
@@ -105,8 +105,8 @@ MSFP_WIDE void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, c
         double *before = s->before[j];
         MSFP_UNROLL
         for (int i = 0; i < MSFP_SHEAR_SIZE; ++i)
-            before[MSFP_BEFORE_Y + i] = seed ? seed->fp[j][i] : at->f[j][i];
-        before[MSFP_BEFORE_BETA] = seed ? seed->beta : 0.0;
+            before[MSFP_BEFORE_Y + i] = weights ? weights->fp[j][i] : at->f[j][i];
+        before[MSFP_BEFORE_BETA] = weights ? weights->beta : 0.0;
 #if MSFP_MEMORY
         before[MSFP_BEFORE_PAST] = at->past[j];
         before[MSFP_BEFORE_GAIN] = at->gain;

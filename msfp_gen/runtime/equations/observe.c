@@ -77,24 +77,24 @@ double msfp_stored_energy(const msfp_parameters *p, const msfp_point *at, const 
     return stored;
 }
 
-void msfp_evaluate_state(const msfp_parameters *p, const msfp_point *at, msfp_seed *seed, msfp_work *w,
+void msfp_evaluate_state(const msfp_parameters *p, const msfp_point *at, msfp_stage_weights *weights, msfp_work *w,
                          double g[NB][2])
 {
     double residual[MSFP_DOF];
-    memset(seed, 0, sizeof *seed);
-    memcpy(seed->fp, at->f, sizeof seed->fp);
+    memset(weights, 0, sizeof *weights);
+    memcpy(weights->fp, at->f, sizeof weights->fp);
     memcpy(g, at->f, sizeof at->f);
 #if MSFP_LAW
     memset(w->coefficient, 0, sizeof w->coefficient);
 #endif
-    msfp_condensed(p, at, seed, w, g, residual, NULL);
+    msfp_condensed(p, at, weights, w, g, residual, NULL);
 }
 
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row)
 {
     double g[NB][2];
-    msfp_seed seed;
-    msfp_evaluate_state(p, at, &seed, w, g);
+    msfp_stage_weights weights;
+    msfp_evaluate_state(p, at, &weights, w, g);
     const msfp_mechanical mechanical = msfp_mechanical_energy(p, at, w);
     msfp_record(p, at, w, &mechanical, row);
 }

@@ -99,19 +99,19 @@ MSFP_INLINE void twists(const msfp_work *w, const double *seed, double *twist)
 }
 
 /* Columns of force and moment at the top, whose springs act along fixed axes. */
-MSFP_INLINE void top_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                             const double *variation, columns *c)
+MSFP_INLINE void top_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_stage_weights *weights,
+                             msfp_work *w, const double *variation, columns *c)
 {
     double body[MSFP_BODY_SIZE], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
     msfp_transported_twist_tangent(w->body[NB], no_twist, body, c->twist, w->dbody[NB]);
     memset(w->dx[NB], 0, sizeof w->dx[NB]);
 #if MSFP_SPIN_LOCKED
-    (void)seed;
+    (void)weights;
     (void)variation;
 #else
     add_variation(w->dbody[NB] + MSFP_BODY_WPX * DOF, NB, variation, VARIATION_WP, MOMENT);
     add_variation(w->dbody[NB] + MSFP_BODY_ALPX * DOF, NB, variation, VARIATION_WP + MOMENT, MOMENT);
-    w->dx[NB][MSFP_COORDINATES_PHI * DOF + DOF - 1] = seed->q_weight;
+    w->dx[NB][MSFP_COORDINATES_PHI * DOF + DOF - 1] = weights->q_weight;
 #endif
     msfp_top_tangent(p, at, w);
     msfp_transported_wrench_tangent(w->body[NB], no_twist, w->force[NB], w->moment[NB], wrench, c->twist, w->dforce[NB],
@@ -122,10 +122,10 @@ MSFP_INLINE void top_tangent(const msfp_parameters *p, const msfp_point *at, con
 
 /* Derivatives of the inputs of the contact of surface j with respect to the unknowns of the body above:
  * [inputs][ND][lane], with the surface in lane j. */
-MSFP_INLINE void local_inputs(const msfp_work *w, const msfp_seed *seed, const double *rim, int j,
+MSFP_INLINE void local_inputs(const msfp_work *w, const msfp_stage_weights *weights, const double *rim, int j,
                               const double *variation, double *inputs)
 {
-    const double factors[2] = { seed->q_weight, seed->v_weight };
+    const double factors[2] = { weights->q_weight, weights->v_weight };
     for (int k = 0; k < INPUTS; ++k)
         for (int i = 0; i < ND; ++i)
             inputs[(k * ND + i) * LANES + j] = variation[i * VARIATION + (k < FORCE ? VARIATION_P + k : k - FORCE)];
@@ -136,12 +136,12 @@ MSFP_INLINE void local_inputs(const msfp_work *w, const msfp_seed *seed, const d
 
 /* Derivatives of the results of all contacts with respect to the unknowns of the body above, at constant force on it:
  * [MSFP_CONTACT_ROWS][ND][lane]. */
-MSFP_INLINE void local_parts(const msfp_work *w, const msfp_seed *seed, double variation[NB + 1][ND * VARIATION],
-                             double *restrict parts)
+MSFP_INLINE void local_parts(const msfp_work *w, const msfp_stage_weights *weights,
+                             double variation[NB + 1][ND * VARIATION], double *restrict parts)
 {
     double inputs[INPUTS * ND * LANES] = { 0.0 };
     for (int j = 0; j < NB; ++j)
-        local_inputs(w, seed, w->jacobians.rim[j], j, variation[j + 1], inputs);
+        local_inputs(w, weights, w->jacobians.rim[j], j, variation[j + 1], inputs);
     for (int r = 0; r < MSFP_CONTACT_ROWS; ++r) {
         const double *slopes = w->jacobians.contact + r * INPUTS * LANES;
         for (int i = 0; i < ND; ++i) {
@@ -175,13 +175,15 @@ MSFP_INLINE void contact_row(const double *restrict slope, const double *restric
 }
 
 /* Columns of the moment of surface j, in the basis of the body below, of N and in models with gradients of the rates. */
-MSFP_INLINE void surface_tangent(msfp_work *w, const msfp_seed *seed, int j, const double *parts, columns *c)
+MSFP_INLINE void surface_tangent(msfp_work *w, const msfp_stage_weights *weights, int j, const double *parts,
+                                 columns *c)
 {
     double unused[FORCE], local[FORCE * DOF];
-    const double *rim = w->jacobians.rim[j], factors[2] = { seed->q_weight, seed->v_weight };
+    const double *rim = w->jacobians.rim[j], factors[2] = { weights->q_weight, weights->v_weight };
     msfp_force_to_local_tangent(w->body[j], w->force[j], unused, c->below, local);
     for (int r = 0; r < MSFP_CONTACT_ROWS; ++r)
-        contact_row(w->jacobians.contact + r * INPUTS * LANES + j, local, j, parts + r * ND * LANES + j, seed->v_weight,
+        contact_row(w->jacobians.contact + r * INPUTS * LANES + j, local, j, parts + r * ND * LANES + j,
+                    weights->v_weight,
                     r < MOMENT    ? c->moment_below + r * DOF
                     : r == MOMENT ? w->dnormal[j]
                                   : RATE_ROW(w, j, r - MOMENT - 1));
@@ -221,17 +223,17 @@ MSFP_INLINE void balance(const msfp_parameters *p, const msfp_work *w, int k, co
 }
 
 /* The tangent from the columns at the top downwards. */
-MSFP_INLINE void descend(const msfp_parameters *p, const msfp_seed *seed, msfp_work *w,
+MSFP_INLINE void descend(const msfp_parameters *p, const msfp_stage_weights *weights, msfp_work *w,
                          double variation[NB + 1][ND * VARIATION], columns *c, double *tangent)
 {
     double parts[MSFP_CONTACT_ROWS * ND * LANES];
-    local_parts(w, seed, variation, parts);
+    local_parts(w, weights, variation, parts);
     for (int k = NB; k >= 1; --k) {
         double next[FORCE * DOF]; /* in the frame of the body below */
         force_below(p, w, k, variation[k], c);
         memcpy(next, c->below, sizeof next);
         add_variation(next, k, variation[k], VARIATION_F, FORCE);
-        surface_tangent(w, seed, k - 1, parts, c);
+        surface_tangent(w, weights, k - 1, parts, c);
         balance(p, w, k, variation[k], c, tangent);
         memcpy(c->above, next, sizeof c->above);
         memcpy(c->moment_above, c->moment_below, sizeof c->moment_above);
@@ -241,7 +243,7 @@ MSFP_INLINE void descend(const msfp_parameters *p, const msfp_seed *seed, msfp_w
 MSFP_WIDE void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const double *dforce, const double *dmoment,
                                  double *derivatives)
 {
-    static const msfp_seed none;
+    static const msfp_stage_weights none;
     double variation[NB + 1][ND * VARIATION] = { { 0.0 } };
     double wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
     columns c;
@@ -253,10 +255,10 @@ MSFP_WIDE void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const d
     descend(p, &none, w, variation, &c, derivatives);
 }
 
-MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                            double *tangent)
+MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_stage_weights *weights,
+                            msfp_work *w, double *tangent)
 {
-    const double factors[MSFP_SEED_SIZE] = { seed->q_weight, seed->v_weight, seed->a_weight };
+    const double factors[MSFP_SEED_SIZE] = { weights->q_weight, weights->v_weight, weights->a_weight };
     double variation[NB + 1][ND * VARIATION], moment[MOMENT];
     columns c;
     twists(w, factors, c.twist);
@@ -265,7 +267,7 @@ MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, cons
         msfp_local_variation(factors, w->body[k - 1], w->body[k], w->x[k], w->x[k - 1], w->force[k - 1], moment,
                              variation[k]);
     }
-    top_tangent(p, at, seed, w, variation[NB], &c);
-    descend(p, seed, w, variation, &c, tangent);
+    top_tangent(p, at, weights, w, variation[NB], &c);
+    descend(p, weights, w, variation, &c, tangent);
 }
 #endif

@@ -37,10 +37,10 @@ void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const double *dfo
     descend(p, w, &s, derivatives);
 }
 
-MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                            double *tangent)
+MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_stage_weights *weights,
+                            msfp_work *w, double *tangent)
 {
-    const double factors[3] = { seed->q_weight, seed->v_weight, seed->a_weight };
+    const double factors[3] = { weights->q_weight, weights->v_weight, weights->a_weight };
     msfp_blocks s;
     memset(w->dx, 0, sizeof w->dx);
     memset(w->dbody[0], 0, sizeof w->dbody[0]);

@@ -22,8 +22,8 @@ static int factorise(msfp_run *run)
     stage_history->all_slopes = energies || end_is_recorded(run);
     for (int i = 1; i <= last; ++i) {
         msfp_stage *s = &stage_history->stage[i];
-        const int status = msfp_tangent_with_slopes(&run->parameters, &s->at, &s->seed, &stage_history->work[i], s->g,
-                                                    energies || (i == last && stage_history->all_slopes),
+        const int status = msfp_tangent_with_slopes(&run->parameters, &s->at, &s->weights, &stage_history->work[i],
+                                                    s->g, energies || (i == last && stage_history->all_slopes),
                                                     &stage_history->slopes[i], stage_history->factors[i]);
         if (status)
             return status;

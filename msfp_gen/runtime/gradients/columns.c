@@ -130,14 +130,13 @@ MSFP_WIDE void msfp_rim_columns(const msfp_parameters *p, const msfp_parameter_c
 }
 #endif
 
-MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
-                                      const msfp_point *at, const msfp_point_columns *dat, const msfp_seed *seed,
-                                      const msfp_work *w, const msfp_slopes *slopes, int wanted,
-                                      msfp_work_columns *d)
+MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                                      const msfp_point_columns *dat, const msfp_stage_weights *weights,
+                                      const msfp_work *w, const msfp_slopes *slopes, int wanted, msfp_work_columns *d)
 {
     msfp_blocks s;
     msfp_block_directions ds;
-    s.seed = seed;
+    s.weights = weights;
     s.at = at;
     ds.point = dat;
     ds.slopes = slopes;

@@ -71,7 +71,7 @@ MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, dou
 }
 
 /* The derivatives of the first `rows` results; inlined for each number of them, so that no others are computed. */
-MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
+MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_stage_weights *weights, const msfp_work *w,
                                 const double g[MSFP_NB][2], int rows, msfp_slopes *slopes)
 {
     double stage[MSFP_STAGE_SIZE * LANES], contact_frame[MSFP_CONTACT_FRAME_SIZE * LANES], force[FRICTION * LANES];
@@ -95,39 +95,39 @@ MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_seed *seed,
     msfp_contact_by_inputs_jacobian(&p->lanes[0][0], stage, contact_frame, force MSFP_IF_LAW(x), out,
                                     &jacobian[0][0][0]);
 #if MSFP_CLOSED_FORM
-    if (seed->closed_form) {
+    if (weights->closed_form) {
         memcpy(slopes->of, jacobian, (size_t)rows * sizeof *jacobian);
         return;
     }
 #else
-    (void)seed;
+    (void)weights;
 #endif
     eliminate(out + MSFP_CONTACT_DY * LANES, stage + MSFP_STAGE_TAU * LANES, rows, jacobian, slopes->of);
 }
 
-MSFP_WIDE void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
+MSFP_WIDE void msfp_contact_slopes(const msfp_parameters *p, const msfp_stage_weights *weights, const msfp_work *w,
                                    const double g[MSFP_NB][2], int all, msfp_slopes *slopes)
 {
     if (all)
-        contact_slopes(p, seed, w, g, RESULTS, slopes);
+        contact_slopes(p, weights, w, g, RESULTS, slopes);
     else
-        contact_slopes(p, seed, w, g, FEW, slopes);
+        contact_slopes(p, weights, w, g, FEW, slopes);
 }
 
-int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                             double g[MSFP_NB][2], int all, msfp_slopes *slopes, double *tangent)
+int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_stage_weights *weights,
+                             msfp_work *w, double g[MSFP_NB][2], int all, msfp_slopes *slopes, double *tangent)
 {
     enum { SIZE = MSFP_CONTACT_FRAME_SIZE * LANES };
     int closed_form = 0;
 #if MSFP_CLOSED_FORM
-    closed_form = seed->closed_form;
+    closed_form = weights->closed_form;
 #endif
     for (int j = 0; j < NB; ++j)
         msfp_rim_force(p, w, j, w->jacobians.rim[j]);
-    const int status = closed_form ? msfp_contacts(p, w, seed, g, w->jacobians.contact) : MSFP_OK;
+    const int status = closed_form ? msfp_contacts(p, w, weights, g, w->jacobians.contact) : MSFP_OK;
     if (status)
         return status;
-    msfp_contact_slopes(p, seed, w, (const double(*)[2])g, all, slopes);
+    msfp_contact_slopes(p, weights, w, (const double (*)[2])g, all, slopes);
     int from[MSFP_CONTACT_ROWS] = { 0 }; /* row MOMENT, that of N, does not enter the tangent */
     for (int r = 0; r < RESULTS; ++r) {
         if (r < MOMENT + FRICTION)
@@ -140,7 +140,7 @@ int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, con
     for (int r = 0; r < MSFP_CONTACT_ROWS && !closed_form; ++r)
         memcpy(w->jacobians.contact + r * SIZE, slopes->of[from[r]][GIVEN - MSFP_CONTACT_FRAME_SIZE],
                SIZE * sizeof(double));
-    msfp_tangent(p, at, seed, w, tangent);
+    msfp_tangent(p, at, weights, w, tangent);
     return MSFP_OK;
 }
 
@@ -159,9 +159,9 @@ MSFP_INLINE void results_columns(const msfp_slopes *slopes, const double *const 
 }
 
 /* The columns of surface j; inlined for each number of results. */
-MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
-                                 const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j,
-                                 int rows, msfp_work_columns *d)
+MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
+                                 const msfp_stage_weights *weights, const msfp_point_columns *dat, const msfp_work *w,
+                                 const msfp_slopes *slopes, int j, int rows, msfp_work_columns *d)
 {
     double *dstage = d->stage[j], unknowns[UNKNOWNS * C];
     const double *const blocks[] = { dp->surface[j], dstage, d->contact_frame[j], unknowns, unknowns + FRICTION * C },
@@ -170,9 +170,9 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
     for (int i = 0; i < INPUTS; ++i)
         inputs[i] = blocks[input[i].block] + input[i].index * C;
 #if MSFP_CLOSED_FORM
-    if (seed->closed_form) {
+    if (weights->closed_form) {
         double dslid[MSFP_SLID_SIZE * C];
-        msfp_slid_friction_direction(p->surface[j], seed->slip[j], w->contact_frame[j], dp->surface[j], dat->slip[j],
+        msfp_slid_friction_direction(p->surface[j], weights->slip[j], w->contact_frame[j], dp->surface[j], dat->slip[j],
                                      d->contact_frame[j], dslid);
         memset(dstage, 0, sizeof d->stage[j]);
         memcpy(dstage + MSFP_STAGE_Y * C, dslid + MSFP_SLID_Y * C, sizeof(msfp_columns));
@@ -183,21 +183,21 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
     }
 #endif
     (void)p;
-    (void)seed;
+    (void)weights;
     (void)dat;
     (void)w;
     results_columns(slopes, inputs, GIVEN, rows, j, d->contact[j]);
 }
 
-MSFP_WIDE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
-                                    const msfp_work *w, const msfp_point_columns *dat, const msfp_slopes *slopes,
-                                    const msfp_seed *seed, int all, msfp_work_columns *d)
+MSFP_WIDE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                                    const msfp_point_columns *dat, const msfp_slopes *slopes,
+                                    const msfp_stage_weights *weights, int all, msfp_work_columns *d)
 {
     for (int j = 0; j < NB; ++j) {
         if (all)
-            contact_columns(p, dp, seed, dat, w, slopes, j, RESULTS, d);
+            contact_columns(p, dp, weights, dat, w, slopes, j, RESULTS, d);
         else
-            contact_columns(p, dp, seed, dat, w, slopes, j, FEW, d);
+            contact_columns(p, dp, weights, dat, w, slopes, j, FEW, d);
     }
 }
 #endif

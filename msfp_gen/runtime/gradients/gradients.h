@@ -22,7 +22,7 @@ typedef struct {
     double top[MSFP_TOP_PARAMETERS_SIZE * MSFP_COLUMNS];
 } msfp_parameter_columns;
 
-/* Of a state and its inputs, and of the stage formula of Y, Z: f is fp and slip that of msfp_seed. */
+/* Of a state and its inputs, and of the stage formula of Y, Z: f is fp and slip that of msfp_stage_weights. */
 typedef struct {
     msfp_columns base[3][6], load[6];
     int base_moves; /* whether those of the base may differ from zero */
@@ -82,7 +82,7 @@ void msfp_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp
 enum { MSFP_OF_RESIDUAL = 1, MSFP_OF_ROW = 2 };
 /* Columns of the condensed equations at the evaluation in `w`. */
 void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                            const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
+                            const msfp_point_columns *dat, const msfp_stage_weights *weights, const msfp_work *w,
                             const msfp_slopes *slopes, int wanted, msfp_work_columns *d);
 /* Solve factors x = columns [MSFP_DOF][MSFP_COLUMNS], in place. */
 void msfp_solve_columns(const double *factors, const int *pivots, msfp_columns *columns);
@@ -92,16 +92,16 @@ void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[MSFP_NB][
 /* ---- contact_columns.c ---- */
 
 /* g: the friction force over -mu N; all: of all results, otherwise of the moments and of the rates of Y, Z. */
-void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
+void msfp_contact_slopes(const msfp_parameters *p, const msfp_stage_weights *weights, const msfp_work *w,
                          const double g[MSFP_NB][2], int all, msfp_slopes *slopes);
 /* Tangent of the condensed equations at the evaluation in `w`, with the derivatives of its contacts; all: as before.
  * Returns a status. */
-int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                             double g[MSFP_NB][2], int all, msfp_slopes *slopes, double *tangent);
+int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_stage_weights *weights,
+                             msfp_work *w, double g[MSFP_NB][2], int all, msfp_slopes *slopes, double *tangent);
 /* Columns of all contacts, after those of their local blocks; all: as before. */
 void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
-                          const msfp_point_columns *dat, const msfp_slopes *slopes, const msfp_seed *seed, int all,
-                          msfp_work_columns *d);
+                          const msfp_point_columns *dat, const msfp_slopes *slopes, const msfp_stage_weights *weights,
+                          int all, msfp_work_columns *d);
 
 /* ---- observation.c: what is recorded ---- */
 
@@ -296,8 +296,8 @@ void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_colum
                             const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
                             msfp_state_columns *to);
 /* Columns of the powers of the present state, at the point and evaluation of msfp_initial_columns. */
-void msfp_initial_works(msfp_run *run, msfp_parameter_batch *batch, const msfp_point *at, const msfp_seed *seed,
-                        const double g[MSFP_NB][2]);
+void msfp_initial_works(msfp_run *run, msfp_parameter_batch *batch, const msfp_point *at,
+                        const msfp_stage_weights *weights, const double g[MSFP_NB][2]);
 /* Columns of powers and works of stage i, which is solved, into stages[i]; from: what the earlier ones give. */
 void msfp_stage_works(msfp_run *run, msfp_parameter_batch *batch, int i, const msfp_state_columns *from,
                       msfp_state_columns *stages);

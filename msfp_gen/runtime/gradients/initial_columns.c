@@ -74,19 +74,19 @@ int msfp_initial_columns(msfp_run *run, msfp_parameter_batch *batch, int first)
     msfp_slopes *slopes = &stage_history->slopes[0];
     msfp_state_columns *now = &batch->now;
     msfp_point_columns *dat = &batch->point;
-    msfp_seed seed = { .a_weight = 1.0 };
+    msfp_stage_weights weights = { .a_weight = 1.0 };
     msfp_point at;
     double g[NB][2], residual[DOF];
     msfp_to_point(run, &run->now, &at);
-    memcpy(seed.fp, at.f, sizeof seed.fp);
+    memcpy(weights.fp, at.f, sizeof weights.fp);
     memcpy(g, at.f, sizeof g);
 #if MSFP_LAW
     memset(w->coefficient, 0, sizeof w->coefficient);
 #endif
-    const int status = msfp_condensed(p, &at, &seed, w, g, residual, stage_history->factors[0]);
+    const int status = msfp_condensed(p, &at, &weights, w, g, residual, stage_history->factors[0]);
     if (status)
         return status;
-    msfp_contact_slopes(p, &seed, w, (const double(*)[2])g, 0, slopes);
+    msfp_contact_slopes(p, &weights, w, (const double (*)[2])g, 0, slopes);
     memset(dat, 0, sizeof *dat);
     memset(now->t, 0, sizeof now->t);
     memset(now->a, 0, sizeof now->a);
@@ -96,11 +96,11 @@ int msfp_initial_columns(msfp_run *run, msfp_parameter_batch *batch, int first)
     msfp_memory_point_columns(&run->now, now, 0.0, dat);
     msfp_inputs_columns(run, batch, run->now.t, now->t, dat);
     if (first) {
-        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &batch->work);
+        msfp_condensed_columns(p, dp, &at, dat, &weights, w, slopes, MSFP_OF_RESIDUAL, &batch->work);
         msfp_resting_foot_direction(p->top, w->body[NB], dp->top, batch->work.body[NB], now->foot[0]);
     }
     memcpy(dat->foot, now->foot, sizeof dat->foot);
-    msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &batch->work);
+    msfp_condensed_columns(p, dp, &at, dat, &weights, w, slopes, MSFP_OF_RESIDUAL, &batch->work);
     if (!MSFP_MASSLESS) {
         if (msfp_lu(stage_history->factors[0], DOF, stage_history->pivots[0]) == 0)
             return MSFP_E_IRREGULAR;
@@ -109,7 +109,7 @@ int msfp_initial_columns(msfp_run *run, msfp_parameter_batch *batch, int first)
             for (int i = 0; i < ND; ++i)
                 msfp_add_columns(&now->a[k][unknown[i]], &batch->work.residual[k * ND + i], -1.0, 1);
         memcpy(dat->a, now->a, sizeof dat->a);
-        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &batch->work);
+        msfp_condensed_columns(p, dp, &at, dat, &weights, w, slopes, MSFP_OF_RESIDUAL, &batch->work);
     }
     msfp_friction_columns(&batch->work, now->df, NULL);
 #if MSFP_MEMORY
@@ -122,7 +122,7 @@ int msfp_initial_columns(msfp_run *run, msfp_parameter_batch *batch, int first)
     memcpy(now->foot, batch->work.foot + MSFP_FOOT_Y * C, sizeof now->foot);
     memcpy(now->dfoot, batch->work.foot + MSFP_FOOT_Y1 * C, sizeof now->dfoot);
     if (run->gradients->energies)
-        msfp_initial_works(run, batch, &at, &seed, (const double(*)[2])g);
+        msfp_initial_works(run, batch, &at, &weights, (const double (*)[2])g);
     return MSFP_OK;
 }
 #endif

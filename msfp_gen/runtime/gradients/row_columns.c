@@ -23,7 +23,7 @@ static void observed_columns(msfp_run *run, msfp_parameter_batch *batch, const m
     memcpy(dat.f, ds->f, sizeof dat.f);
     memcpy(dat.foot, ds->foot, sizeof dat.foot);
     msfp_memory_point_columns(s, ds, 0.0, &dat);
-    msfp_condensed_columns(p, &batch->parameters, &o->at, &dat, &o->seed, &o->work, slopes, MSFP_OF_ROW, dw);
+    msfp_condensed_columns(p, &batch->parameters, &o->at, &dat, &o->weights, &o->work, slopes, MSFP_OF_ROW, dw);
     msfp_record_columns(p, &batch->parameters, &o->at, &dat, &o->work, dw, d);
     memcpy(d[MSFP_ROW_WORK], ds->work, sizeof ds->work);
 }
@@ -35,8 +35,8 @@ void msfp_observe_columns(msfp_run *run, msfp_parameter_batch *batch, const msfp
     msfp_observation *o = &run->gradients->recording.own;
     msfp_slopes *slopes = &run->gradients->recording.own_slopes;
     msfp_to_point(run, s, &o->at);
-    msfp_evaluate_state(p, &o->at, &o->seed, &o->work, o->g);
-    msfp_contact_slopes(p, &o->seed, &o->work, (const double(*)[2])o->g, 1, slopes);
+    msfp_evaluate_state(p, &o->at, &o->weights, &o->work, o->g);
+    msfp_contact_slopes(p, &o->weights, &o->work, (const double (*)[2])o->g, 1, slopes);
     observed_columns(run, batch, o, slopes, s, ds, d);
 }
 
@@ -47,7 +47,7 @@ static void node_columns(msfp_run *run, msfp_parameter_batch *batch, int index, 
     msfp_recording *r = &run->gradients->recording;
     const msfp_observation *o = &r->node[index];
     if (!r->sloped[index])
-        msfp_contact_slopes(&run->parameters, &o->seed, &o->work, (const double(*)[2])o->g, 1, &r->slopes[index]);
+        msfp_contact_slopes(&run->parameters, &o->weights, &o->work, (const double (*)[2])o->g, 1, &r->slopes[index]);
     r->sloped[index] = 1;
     observed_columns(run, batch, o, &r->slopes[index], s, ds, d);
 }

@@ -61,8 +61,8 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_parameter_batch *batch, int i, 
         for (int d = 0; d < ND; ++d)
             memset(dat->v[k][unknown[d]], 0, sizeof(msfp_columns));
     stage_point_columns(run, i, from, dat);
-    msfp_condensed_columns(&run->parameters, &batch->parameters, &stage->at, dat, &stage->seed, &stage_history->work[i],
-                           &stage_history->slopes[i], MSFP_OF_RESIDUAL, &batch->work);
+    msfp_condensed_columns(&run->parameters, &batch->parameters, &stage->at, dat, &stage->weights,
+                           &stage_history->work[i], &stage_history->slopes[i], MSFP_OF_RESIDUAL, &batch->work);
     msfp_solve_columns(stage_history->factors[i], stage_history->pivots[i], x);
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
@@ -77,11 +77,11 @@ void msfp_complete_columns(msfp_run *run, msfp_parameter_batch *batch)
     const int last = msfp_last_stage(run), wanted = MSFP_OF_ROW | (run->gradients->energies ? MSFP_OF_RESIDUAL : 0);
     const msfp_stage *stage = &stage_history->stage[last];
     if (!stage_history->all_slopes)
-        msfp_contact_slopes(&run->parameters, &stage->seed, &stage_history->work[last], stage->g, 1,
+        msfp_contact_slopes(&run->parameters, &stage->weights, &stage_history->work[last], stage->g, 1,
                             &stage_history->slopes[last]);
     stage_history->all_slopes = 1;
     if (!batch->complete)
-        msfp_condensed_columns(&run->parameters, &batch->parameters, &stage->at, &batch->point, &stage->seed,
+        msfp_condensed_columns(&run->parameters, &batch->parameters, &stage->at, &batch->point, &stage->weights,
                                &stage_history->work[last], &stage_history->slopes[last], wanted, &batch->work);
     batch->complete = 1;
 }

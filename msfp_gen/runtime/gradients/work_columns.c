@@ -30,7 +30,7 @@ MSFP_WIDE void msfp_stage_works(msfp_run *run, msfp_parameter_batch *batch, int 
     const msfp_stage *stage = &stage_history->stage[i];
     const double h = stage->beta / method->gamma;
     msfp_state_columns *to = &stages[i];
-    msfp_condensed_columns(&run->parameters, &batch->parameters, &stage->at, &batch->point, &stage->seed,
+    msfp_condensed_columns(&run->parameters, &batch->parameters, &stage->at, &batch->point, &stage->weights,
                            &stage_history->work[i], &stage_history->slopes[i], MSFP_OF_RESIDUAL | MSFP_OF_ROW,
                            &batch->work);
     msfp_columns_of_powers(&run->parameters, &batch->parameters, &stage->at, &batch->point, &stage_history->work[i],
@@ -121,15 +121,15 @@ void msfp_quasistatic_works(msfp_run *run, msfp_parameter_batch *batch)
 }
 #endif
 
-void msfp_initial_works(msfp_run *run, msfp_parameter_batch *batch, const msfp_point *at, const msfp_seed *seed,
-                        const double g[NB][2])
+void msfp_initial_works(msfp_run *run, msfp_parameter_batch *batch, const msfp_point *at,
+                        const msfp_stage_weights *weights, const double g[NB][2])
 {
     msfp_stage_history *stage_history = &run->gradients->stage_history;
     const msfp_work *w = &stage_history->work[0];
     msfp_state_columns *now = &batch->now;
-    msfp_contact_slopes(&run->parameters, seed, w, g, 1, &stage_history->slopes[0]);
-    msfp_condensed_columns(&run->parameters, &batch->parameters, at, &batch->point, seed, w, &stage_history->slopes[0],
-                           MSFP_OF_RESIDUAL | MSFP_OF_ROW, &batch->work);
+    msfp_contact_slopes(&run->parameters, weights, w, g, 1, &stage_history->slopes[0]);
+    msfp_condensed_columns(&run->parameters, &batch->parameters, at, &batch->point, weights, w,
+                           &stage_history->slopes[0], MSFP_OF_RESIDUAL | MSFP_OF_ROW, &batch->work);
     msfp_columns_of_powers(&run->parameters, &batch->parameters, at, &batch->point, w, &batch->work, now);
 #if MSFP_CLOSED_FORM
     if (!msfp_is_quasistatic(run))

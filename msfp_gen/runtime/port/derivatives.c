@@ -197,9 +197,9 @@ static void differentiate_stage(const msfp_port *port, const msfp_run *run, cons
 static void blocks_of(const msfp_port *port, msfp_stage *stage, msfp_work *w, msfp_blocks *s)
 {
     const msfp_ends *at = &port->to;
-    msfp_seed seed = stage->seed;
-    seed.same_base = 0;
-    msfp_set_inputs(&port->run.parameters, &stage->at, &seed, w, s);
+    msfp_stage_weights weights = stage->weights;
+    weights.same_base = 0;
+    msfp_set_inputs(&port->run.parameters, &stage->at, &weights, w, s);
     msfp_far_end(port, at->of[1][0], at->of[1][1], at->of[1][0], s->far_end);
     s->g = stage->g;
 #if MSFP_TOP_ROTATION
@@ -221,7 +221,7 @@ static int repeat(msfp_port *port, msfp_run *run, moved *m)
     for (size_t step = 0; step < port->time_count; ++step) {
         double error, size, residual[DOF], basis[MSFP_ORDERS][6];
         msfp_stages_begin(run, &s, port->times[step] - run->now.t);
-        s.now.seed.accuracy = 0.0;
+        s.now.weights.accuracy = 0.0;
         for (int i = 1; i < s.method->stages; ++i) {
             const double t = run->now.t + s.method->c[i] * s.h;
             const int last = step + 1 == port->time_count && i + 1 == s.method->stages;

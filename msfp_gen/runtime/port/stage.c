@@ -76,7 +76,7 @@ int msfp_port_stage(msfp_port *port, int i, const double *ends, double *wrench)
     }
     port->step.solved = 0;
     set_ends(port, &to, &s->now.at);
-    s->now.seed.same_base = again; /* the lower end moves as it does */
+    s->now.weights.same_base = again; /* the lower end moves as it does */
     if (again) {
         if (port->step.moved)
             follow(port, &to);

@@ -8,7 +8,7 @@ static void observe(msfp_run *run, const msfp_state *s, msfp_observation *o, msf
 {
     const msfp_parameters *p = &run->parameters;
     msfp_to_point(run, s, &o->at);
-    msfp_evaluate_state(p, &o->at, &o->seed, &o->work, o->g);
+    msfp_evaluate_state(p, &o->at, &o->weights, &o->work, o->g);
     const msfp_mechanical mechanical = msfp_mechanical_energy(p, &o->at, &o->work);
     msfp_record(p, &o->at, &o->work, &mechanical, row);
     row->time = s->t;

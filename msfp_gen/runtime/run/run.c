@@ -16,7 +16,7 @@ static int solve_initial_state(msfp_run *run)
     msfp_point at;
     msfp_solution solution = { 0, 0, 0.0 };
     double g[NB][2], residual[MSFP_DOF];
-    msfp_seed seed = { 0 };
+    msfp_stage_weights weights = { 0 };
     msfp_to_point(run, &run->now, &at);
     memset(at.a, 0, sizeof at.a);
     if (!MSFP_MASSLESS) {
@@ -26,9 +26,9 @@ static int solve_initial_state(msfp_run *run)
         if (run->options.method != MSFP_METHOD_DOPRI5 && run->determinant == 0)
             run->determinant = solution.determinant;
     }
-    memcpy(seed.fp, at.f, sizeof seed.fp);
+    memcpy(weights.fp, at.f, sizeof weights.fp);
     memcpy(g, at.f, sizeof g);
-    const int status = msfp_condensed(&run->parameters, &at, &seed, &run->work, g, residual, NULL);
+    const int status = msfp_condensed(&run->parameters, &at, &weights, &run->work, g, residual, NULL);
     if (status)
         return status;
     msfp_state_of(run, &at, at.f, &run->now);

@@ -55,7 +55,7 @@ int msfp_classify_failure(msfp_run *run, int status);
 /* The evaluation of a state outside of a step; g: the friction force over -mu N. */
 typedef struct msfp_observation {
     msfp_point at;
-    msfp_seed seed;
+    msfp_stage_weights weights;
     double g[MSFP_NB][2];
     msfp_work work;
 } msfp_observation;

@@ -65,16 +65,16 @@ static int integrals(msfp_run *run, double h)
     msfp_point at;
     msfp_work w;
     double g[NB][2], residual[MSFP_DOF], power[MSFP_WORKS];
-    msfp_seed seed = { 0 };
+    msfp_stage_weights weights = { 0 };
     memcpy(next->work, run->now.work, sizeof next->work); /* not used at the middle of the step */
     msfp_interpolate(run, 0.5, &middle);
     msfp_to_point(run, &middle, &at);
-    memcpy(seed.fp, at.f, sizeof seed.fp);
+    memcpy(weights.fp, at.f, sizeof weights.fp);
     memcpy(g, at.f, sizeof g);
 #if MSFP_LAW
     memcpy(w.coefficient, run->work.coefficient, sizeof w.coefficient);
 #endif
-    const int status = msfp_condensed(&run->parameters, &at, &seed, &w, g, residual, NULL);
+    const int status = msfp_condensed(&run->parameters, &at, &weights, &w, g, residual, NULL);
     if (status)
         return status;
     const msfp_mechanical mechanical = msfp_mechanical_energy(&run->parameters, &at, &w);
@@ -103,10 +103,10 @@ static int finish(msfp_run *run, const msfp_point *at, const msfp_state *last, d
 {
     msfp_state *next = &run->next;
     double g[NB][2], residual[MSFP_DOF];
-    msfp_seed seed = { 0 };
-    memcpy(seed.fp, at->f, sizeof seed.fp);
+    msfp_stage_weights weights = { 0 };
+    memcpy(weights.fp, at->f, sizeof weights.fp);
     memcpy(g, at->f, sizeof g);
-    const int status = msfp_condensed(&run->parameters, at, &seed, &run->work, g, residual, NULL);
+    const int status = msfp_condensed(&run->parameters, at, &weights, &run->work, g, residual, NULL);
     if (status)
         return status;
     *next = *last;

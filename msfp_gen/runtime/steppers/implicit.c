@@ -14,11 +14,11 @@ void msfp_stage_begin(msfp_run *run, msfp_stages *s, int i)
     msfp_state *from = &s->now.from;
     memcpy(from, &run->now, offsetof(msfp_state, a)); /* without rates */
     msfp_add_rates(from, s->stage, s->method->a[i], i, s->h);
-    memcpy(s->now.seed.fp, from->f, sizeof from->f);
+    memcpy(s->now.weights.fp, from->f, sizeof from->f);
     s->now.at.foot[0] = from->foot[0] + s->now.beta * from->foot[1];
     s->now.at.foot[1] = from->foot[1];
     s->now.at.foot_beta = s->now.beta;
-    s->now.seed.same_base = 0;
+    s->now.weights.same_base = 0;
     msfp_memory_point(from, s->now.beta, &s->now.at);
 }
 
@@ -138,7 +138,7 @@ static void filter(msfp_run *run, const msfp_stages *s, msfp_state *estimate)
     msfp_stage moved = s->now;
     msfp_work w; /* separate, so that run->work keeps the end of the step */
     double residual[DOF];
-    moved.seed.same_base = 0;
+    moved.weights.same_base = 0;
 #if MSFP_LAW
     memcpy(w.coefficient, run->work.coefficient, sizeof w.coefficient);
 #endif
@@ -150,7 +150,7 @@ static void filter(msfp_run *run, const msfp_stages *s, msfp_state *estimate)
             moved.from.v[k][d] += estimate->v[k][d];
         }
         for (int d = 0; d < 2; ++d)
-            moved.seed.fp[k][d] += estimate->f[k][d];
+            moved.weights.fp[k][d] += estimate->f[k][d];
     }
     moved.at.foot[0] += estimate->foot[0] + moved.beta * estimate->foot[1];
     moved.at.foot[1] += estimate->foot[1];
@@ -178,13 +178,13 @@ void msfp_stages_begin(msfp_run *run, msfp_stages *s, double h)
     s->other = 0.0;
     s->now.beta = beta;
     s->now.inertia = 1.0;
-    s->now.seed.q_weight = s->now.seed.beta = beta;
-    s->now.seed.v_weight = 1.0;
+    s->now.weights.q_weight = s->now.weights.beta = beta;
+    s->now.weights.v_weight = 1.0;
 #if MSFP_CLOSED_FORM
-    s->now.seed.closed_form = 0;
+    s->now.weights.closed_form = 0;
 #endif
-    s->now.seed.a_weight = 1.0 / beta;
-    s->now.seed.accuracy = 1e-5 * run->options.rtol;
+    s->now.weights.a_weight = 1.0 / beta;
+    s->now.weights.accuracy = 1e-5 * run->options.rtol;
     memset(s->now.at.a, 0, sizeof s->now.at.a);
     s->stage[0] = run->now;
 }

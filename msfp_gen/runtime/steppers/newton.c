@@ -15,7 +15,7 @@ static const int unknown[ND] = MSFP_FREE;
 static int closed_form(const msfp_stage *s)
 {
 #if MSFP_CLOSED_FORM
-    return s->seed.closed_form;
+    return s->weights.closed_form;
 #else
     (void)s;
     return 0;
@@ -59,11 +59,11 @@ static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual
 {
     ++run->counts[MSFP_COUNT_EVALUATIONS];
     int worst = -1;
-    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, w, s->g, residual, tangent);
+    const int status = msfp_condensed(&run->parameters, &s->at, &s->weights, w, s->g, residual, tangent);
     if (status)
         return status;
     msfp_friction_state(w, s->f);
-    s->seed.same_base = 1;
+    s->weights.same_base = 1;
     *size = msfp_residual_size(&run->parameters, w, residual, &worst);
     run->worst_surface = worst < 0 ? run->worst_surface : worst / ND + 1;
     divide_by_normal(w, residual);
@@ -128,8 +128,8 @@ static double take_step(msfp_run *run, msfp_stage *s, double *residual, double *
 void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
 {
     double residual[DOF], step[DOF];
-    const double with_inertia = s->seed.a_weight;
-    s->inertia = s->seed.a_weight = 0.0;
+    const double with_inertia = s->weights.a_weight;
+    s->inertia = s->weights.a_weight = 0.0;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     for (int i = 0; i < 10 && size > 1e-2 && size < INFINITY; ++i) {
         if (msfp_factorise_stage(run, s, residual, &size))
@@ -137,7 +137,7 @@ void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
         size = take_step(run, s, residual, step, size, 1);
     }
     s->inertia = 1.0;
-    s->seed.a_weight = with_inertia;
+    s->weights.a_weight = with_inertia;
     run->factored_beta = 0.0;
 }
 

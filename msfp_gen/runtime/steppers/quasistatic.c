@@ -52,13 +52,13 @@ static void parabola(const msfp_run *run, msfp_stage *s, double h)
     for (int k = 0; k < NB; ++k) {
         const double now = run->now.q[k][ANGLE];
         s->from.q[k][ANGLE] = now + r * r / (1.0 + 2.0 * r) * (now - run->step_history.q[k]);
-        s->seed.slip[k][MSFP_SLIP_Y] = run->now.f[k][0];
-        s->seed.slip[k][MSFP_SLIP_TURN] = s->from.q[k][ANGLE] - now;
-        s->seed.slip[k][MSFP_SLIP_BETA] = s->beta;
+        s->weights.slip[k][MSFP_SLIP_Y] = run->now.f[k][0];
+        s->weights.slip[k][MSFP_SLIP_TURN] = s->from.q[k][ANGLE] - now;
+        s->weights.slip[k][MSFP_SLIP_BETA] = s->beta;
     }
-    s->seed.q_weight = s->seed.beta = s->beta;
-    s->seed.v_weight = 1.0;
-    s->seed.closed_form = 1;
+    s->weights.q_weight = s->weights.beta = s->beta;
+    s->weights.v_weight = 1.0;
+    s->weights.closed_form = 1;
 }
 
 /* The term that a cubic through the last four states adds to the parabola; 0 where it is large and unreliable. */
@@ -75,7 +75,7 @@ static void guess(const msfp_run *run, msfp_stage *s, double h, int extrapolate)
     for (int k = 0; k < NB; ++k) {
         const double turn =
             extrapolate ? h * (run->now.v[k][ANGLE] + 0.5 * h * run->now.a[k][ANGLE]) + cubic_term(run, k, h) : 0.0;
-        s->at.v[k][ANGLE] = (turn - s->seed.slip[k][MSFP_SLIP_TURN]) / s->beta;
+        s->at.v[k][ANGLE] = (turn - s->weights.slip[k][MSFP_SLIP_TURN]) / s->beta;
     }
 }
 

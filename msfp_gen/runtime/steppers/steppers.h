@@ -111,12 +111,13 @@ double msfp_friction_jump_error(const msfp_state *now, const msfp_state *next);
 
 /* ---- newton.c: the equations of one stage ---- */
 
-/* Unknowns are the rates at.v; q = from.q + beta v and a = inertia (v - from.v)/beta follow, g, Y, Z from the seed. */
+/* Unknowns are the rates at.v; q = from.q + beta v and a = inertia (v - from.v)/beta follow, g, Y, Z from the weights.
+ */
 typedef struct {
     msfp_state from; /* what the earlier stages give: q = from.q + beta v, v = from.v + beta a, and so on */
     double beta;    /* [s] */
     double inertia; /* 1; 0 leaves out all inertia */
-    msfp_seed seed;
+    msfp_stage_weights weights;
     msfp_point at;
     double g[MSFP_NB][2]; /* friction force over -mu N; its first guess before the stage is solved */
     double f[MSFP_NB][2]; /* Y, Z */

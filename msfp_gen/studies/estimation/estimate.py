@@ -220,7 +220,7 @@ def cheaper_models(study: Study) -> list[str]:
     found = []
     for level in ("equivalent", "massless" if "peak_sliding_1" in study.keep.known else "rigid"):
         with suppress(InputError):
-            at_fidelity(SceneFactory(study.recipe).base, level)
+            at_fidelity(SceneFactory(study.inputs).base, level)
             found.append(level)
     return found
 

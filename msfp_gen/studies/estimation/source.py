@@ -191,13 +191,13 @@ def level_study(study: Study, level: str, quantity: str) -> Study:
     chunk = CHUNKS.get(level, CHUNK)
     if level == EXACT:
         return replace(study, given_chunk=study.given_chunk or chunk)
-    scene = {**study.recipe.scene, "fidelity": level}
+    scene = {**study.inputs.scene, "fidelity": level}
     formulas = tuple((name, text) for name, text in study.keep.formulas if name == quantity)
     names = [name for name in names_of(study, level, quantity) if name not in dict(formulas)]
     keep = replace(study.keep, names=tuple(names), formulas=formulas)
     table = {key: value for key, value in study.table.items() if key not in ("keep", "quantities")}
     table |= {"scene": scene, "keep": list(keep.names), "quantities": dict(formulas)}
-    return replace(study, recipe=replace(study.recipe, scene=scene), keep=keep, table=table, given_chunk=chunk)
+    return replace(study, inputs=replace(study.inputs, scene=scene), keep=keep, table=table, given_chunk=chunk)
 
 
 def names_of(study: Study, level: str, quantity: str) -> list[str]:
@@ -211,7 +211,7 @@ def check_quantity(study: Study, quantity: str, levels: Sequence[str]) -> None:
     if quantity not in study.keep.numbers:
         kept = ", ".join(study.keep.numbers)
         raise InputError(f"quantity = {quantity!r}: the study keeps {kept}; give one, or add it to keep")
-    SceneFactory(study.recipe)
+    SceneFactory(study.inputs)
     for level in levels:
         if level != EXACT:
-            SceneFactory(replace(study.recipe, scene={**study.recipe.scene, "fidelity": level}))
+            SceneFactory(replace(study.inputs, scene={**study.inputs.scene, "fidelity": level}))

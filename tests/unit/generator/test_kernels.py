@@ -39,8 +39,8 @@ class Kernels:
             blocks = [use.alias for use in program.inputs]
             source += self._wrapped(program.name, [*blocks, "out"])
             if spec.gradients and program.name in DIFFERENTIATED:
-                at_hand = ["out"] if DIFFERENTIATED[program.name] else []
-                moved = [*blocks, *at_hand, *(f"d{name}" for name in [*blocks, *at_hand]), "dout"]
+                output_is_stored = ["out"] if DIFFERENTIATED[program.name] else []
+                moved = [*blocks, *output_is_stored, *(f"d{name}" for name in [*blocks, *output_is_stored]), "dout"]
                 source += self._wrapped(f"{program.name}_direction", moved)
         for name, content in (runtime_sources() | generate(spec).files | {"kernels.c": source}).items():
             (folder / name).write_text(content, encoding="utf-8")

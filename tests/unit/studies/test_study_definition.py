@@ -90,11 +90,11 @@ def test_records_and_scales_are_axes() -> None:
     ]
     study = load_study({"scene": "ridgecrest-ccc", "records": {"motions": motions, "scales": [0.5, 2]}})
     assert [axis.name for axis in study.axes] == ["record", "scale"] and study.runs == 4
-    assert study.axes[0].labels == tuple(study.recipe.records)
+    assert study.axes[0].labels == tuple(study.inputs.records)
     times = np.linspace(0, 30, 50)
     for run, (index, scale) in enumerate([(0, 0.5), (0, 2), (1, 0.5), (1, 2)], start=1):
         scene = study.scene(run)
-        table = {**study.recipe.scene, "motion": {"kind": "record", **motions[index], "scale": scale}}
+        table = {**study.inputs.scene, "motion": {"kind": "record", **motions[index], "scale": scale}}
         expected = scene_from_table(table).motion
         assert expected is not None
         for time in times:
@@ -111,13 +111,13 @@ def test_the_intensity_measure_is_that_of_the_spectrum(tmp_path: Any) -> None:
     study = load_study({**table, "axes": {"end": {"sets": "duration", "values": [0.1]}}})
     spectrum = response_spectrum(RecordMotion(**motions[0]).build(), [2.0])
     expected = spectrum.psa[0, MEASURES.index("rotd100")]
-    assert study.recipe.intensities == {"clc": pytest.approx(expected)}
+    assert study.inputs.intensities == {"clc": pytest.approx(expected)}
     msfp_gen.study(study, tmp_path, threads=True)
     rows = rows_of(tmp_path)
     np.testing.assert_allclose(rows.intensity, [0.1 * expected, 0.2 * expected])
     np.testing.assert_allclose(rows.twice, 2 * rows.intensity)
     del records["intensity"]["period"]
-    assert load_study(table).recipe.intensities["clc"] == pytest.approx(spectrum.pga[MEASURES.index("rotd100")])
+    assert load_study(table).inputs.intensities["clc"] == pytest.approx(spectrum.pga[MEASURES.index("rotd100")])
     with pytest.raises(InputError, match=r"records.intensity.component = 'rotd10': give one of"):
         load_study({**table, "records": {**records, "intensity": {"component": "rotd10"}}})
 
