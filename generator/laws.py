@@ -123,15 +123,12 @@ def plastic_rates(p: Program, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr)
 
 
 def _after_slip(p: Program, plastic: bool, Y: sp.Expr, slip: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Y after a slip over d_y, and the work that friction dissipates over it, divided by mu N d_y.
-
-    By (3.18) the slip has two parts. While Y u < 0, friction unloads to zero along a straight line. Then Y grows as a
-    hyperbolic tangent, and the work is the integral of Y^3 ds. Where the slip ends in the first part, the exponential
-    is not used: Y stays exact, and its slope is 1 also at rest. By the plastic law the work is the slip beyond the edge
-    of the unit disc.
-
-    In the code y is Y times the direction of the slip, and `left` the slip of the second part.
-    """
+    """Y after a slip over d_y, and the work that friction dissipates over it, divided by mu N d_y."""
+    # By (3.18) the slip has two parts. While Y u < 0, friction unloads to zero along a straight line. Then Y grows as
+    # a hyperbolic tangent, and the work is the integral of Y^3 ds. Where the slip ends in the first part, the
+    # exponential is not used: Y stays exact, and its slope is 1 also at rest. By the plastic law the work is the slip
+    # beyond the edge of the unit disc.
+    # In the code y is Y times the direction of the slip, and `left` the slip of the second part.
     if plastic:
         trial = p.let(Y + slip)
         end = p.let(Clamp(trial))

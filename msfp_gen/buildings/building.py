@@ -70,10 +70,8 @@ def _indices_of_coordinates(values: Array, shape: tuple[int, int]) -> tuple[Indi
 
 
 def _indices_of_array(shape: tuple[int, int], symmetry: str) -> tuple[Indices, Indices]:
-    """Row and column of every entry of the form "array", from 0, shape (entries,).
-
-    Entries are by columns; a column of a symmetric matrix begins at the diagonal.
-    """
+    """Row and column of every entry of the form "array", from 0, shape (entries,)."""
+    # Entries are by columns; a column of a symmetric matrix begins at the diagonal.
     columns, rows = (index.ravel() for index in np.indices(shape[::-1]))
     stored = rows >= columns if symmetry == "symmetric" else np.full(rows.shape, True)
     return rows[stored], columns[stored]
@@ -251,10 +249,8 @@ class Building:
         return Building(mass, damping, stiffness, nodes, columns)
 
     def _damped(self, ratio: float | Sequence[float], frequencies: tuple[float, float] | None) -> Building:
-        """The building with damping of its modes on fixed attachments, or Rayleigh damping C = a M + b K.
-
-        ratio, frequencies: as of `shear`. M: of the motion relative to the attachments. Raises InputError.
-        """
+        """The building with damping of its modes on fixed attachments, or Rayleigh damping C = a M + b K."""
+        # ratio, frequencies: as of `shear`. M: of the motion relative to the attachments. Raises InputError.
         ratios = np.atleast_1d(np.asarray(ratio, dtype=float))
         if ratios.ndim != 1 or not ratios.size or not np.all((ratios >= 0) & (ratios < 1)):
             raise InputError(f"building.damping_ratio = {ratio!r}: give a number, or a list, from 0 to below 1")

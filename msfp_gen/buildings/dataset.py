@@ -148,10 +148,8 @@ def _of_bearings(name: str, field: str, sign: str = "") -> Variable:
 
 
 def _motions(word: str, dims: tuple[str, ...], meaning: str, kind: int = 0) -> dict[str, Variable]:
-    """Variables for displacement, velocity and acceleration in one array.
-
-    word: field of the result. dims: of each variable. kind: index of the unit in MOTION_UNITS.
-    """
+    """Variables for displacement, velocity and acceleration in one array."""
+    # word: field of the result. dims: of each variable. kind: index of the unit in MOTION_UNITS.
     array_dims = (*dims[:-1], "order", dims[-1])
     return {
         f"{word}_{name}": Variable(dims, units[kind], meaning.format(name), word, (..., order, slice(None)), array_dims)

@@ -189,10 +189,8 @@ def _bearing(row: Table, path: str, named: Table, folder: Path | None, bearings:
 
 
 def _bearing_values(source: Any, path: str, named: Table, bearings: dict[str, Bearing]) -> Bearing:
-    """The values of a bearing. source: name in `[bearings]` or of a preset, or a table. Raises InputError.
-
-    named: the table `[bearings]`. bearings: name -> values that are read already; receives further ones.
-    """
+    """The values of a bearing. source: name in `[bearings]` or of a preset, or a table. Raises InputError."""
+    # named: the table `[bearings]`. bearings: name -> values that are read already; receives further ones.
     in_file = isinstance(source, str) and source in named
     if isinstance(source, str) and source in bearings:
         return bearings[source]

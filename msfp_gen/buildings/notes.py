@@ -62,10 +62,8 @@ def _with_others(note: Note, alike: Sequence[Note], addition: str = "") -> Note:
 
 
 def _gathered(notes: Sequence[Note]) -> list[Note]:
-    """The notes, with one note for all bearings of each kind in GATHERED, which many bearings have.
-
-    Of a kind in `RISING` it is the note with the largest value, of another kind the first note.
-    """
+    """The notes, with one note for all bearings of each kind in GATHERED, which many bearings have."""
+    # Of a kind in `RISING` it is the note with the largest value, of another kind the first note.
     gathered = [note for note in notes if note.kind not in GATHERED]
     for kind in GATHERED:
         alike = [note for note in notes if note.kind == kind and not note.action]
@@ -140,11 +138,9 @@ def floors(building: Building) -> list[Floor]:
 
 
 def _mass_properties(inertia: Array) -> tuple[float, Array, float]:
-    """Mass [kg], centre of mass in plan, shape (2,) [m], and moment of inertia about E3 through the centre [kg m^2].
-
-    inertia: of rigid bodies, shape (6, 6). Its columns are motions about the origin. Its rows are about any point,
-    since a rotation about the centre of mass needs no force, so that its moment is equal about all points.
-    """
+    """Mass [kg], centre of mass in plan, shape (2,) [m], and moment of inertia about E3 through the centre [kg m^2]."""
+    # inertia: of rigid bodies, shape (6, 6). Its columns are motions about the origin. Its rows are about any point,
+    # since a rotation about the centre of mass needs no force, so that its moment is equal about all points.
     mass = float(inertia[0, 0])
     x, y = inertia[1, 5] / mass, -inertia[0, 5] / mass
     rotation = inertia[:, 5] + y * inertia[:, 0] - x * inertia[:, 1]
@@ -193,10 +189,8 @@ def _storey_doubts(building: Building, gravity: float) -> Iterator[tuple[int, fl
 
 
 def _drifts(building: Building, acceleration: float) -> Array:
-    """Largest drift of every storey on a fixed base under a lateral acceleration, shape (storeys,) [m].
-
-    acceleration: along E1 or E2 [m/s^2].
-    """
+    """Largest drift of every storey on a fixed base under a lateral acceleration, shape (storeys,) [m]."""
+    # acceleration: along E1 or E2 [m/s^2].
     fixed = building.fixed
     rows = np.stack([columns.deformation[:2] for columns in building.columns])[..., fixed.inner]
     forces = [building.uniform_acceleration(acceleration * axis)[fixed.inner] for axis in np.eye(3)[:2]]
@@ -206,10 +200,8 @@ def _drifts(building: Building, acceleration: float) -> Array:
 
 
 def _undamped(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
-    """A doubt where a mode that the interfaces can damp has less than `LEAST_DAMPING` of critical damping.
-
-    Yields 0 (no surface), the least damping ratio, and the text with the damping that suffices.
-    """
+    """A doubt where a mode that the interfaces can damp has less than `LEAST_DAMPING` of critical damping."""
+    # Yields 0 (no surface), the least damping ratio, and the text with the damping that suffices.
     modes = scene.vertical_modes
     on_springs = modes.shares > OF_INTERFACES
     if not on_springs.any():

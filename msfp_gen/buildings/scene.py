@@ -484,10 +484,8 @@ def remaining_loads(scene: BuildingScene) -> Array:
 
 
 def _vertical_response(scene: BuildingScene, times: Array) -> Array:
-    """Change of the axial loads under the vertical motion of the ground, shape (times, bearings) [N].
-
-    By superposition of modes, without the coupling by damping; exact for an acceleration that is linear in a step.
-    """
+    """Change of the axial loads under the vertical motion of the ground, shape (times, bearings) [N]."""
+    # By superposition of modes, without the coupling by damping; exact for an acceleration that is linear in a step.
     from scipy.signal import cont2discrete, lfilter
 
     building, rows = scene.building, scene.attachments[:, 2]

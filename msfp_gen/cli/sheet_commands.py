@@ -120,10 +120,8 @@ def _lengths(text: str) -> tuple[float, ...]:
 
 
 def _peaks(path: Path) -> tuple[float, float]:
-    """Largest mean displacement of the bearings of a run [m], and of the sum of their forces over their load at rest.
-
-    Raises InputError for a file that is no result, or loads that change.
-    """
+    """Largest mean displacement of the bearings of a run [m], and largest sum of their forces over the load at rest."""
+    # Raises InputError for a file that is no result, or loads that change.
     import numpy as np
 
     result: Any = load_source(str(path))

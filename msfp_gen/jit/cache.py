@@ -293,10 +293,8 @@ def digest_sources() -> str:
 
 
 def _compiler(module: str, inputs: dict[str, Any]) -> list[str]:
-    """Command, path and version of the compiler. Without one, those with which a model of these inputs was built.
-
-    Raises CompileError where there is neither.
-    """
+    """Command, path and version of the compiler. Without one, those with which a model of these inputs was built."""
+    # Raises CompileError where there is neither.
     try:
         compiler = find_compiler()
     except CompileError:
@@ -413,10 +411,8 @@ def _cached_model(folder: Path, inputs: dict[str, object]) -> CachedModel | None
 
 
 def _remove(folder: Path) -> bool:
-    """Delete a folder. Returns False if a build holds its lock or another process has its files open.
-
-    The folder is renamed before it is deleted, so that no process finds an incomplete entry.
-    """
+    """Delete a folder. Returns False if a build holds its lock or another process has its files open."""
+    # The folder is renamed before it is deleted, so that no process finds an incomplete entry.
     with _lock(folder) as acquired:
         if not acquired:
             return False

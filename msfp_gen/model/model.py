@@ -87,10 +87,8 @@ class Ode:
         return np.ascontiguousarray(q, float), np.ascontiguousarray(v, float), np.ascontiguousarray(h, float)
 
     def _base(self, t: float) -> Array:
-        """Displacement, velocity and acceleration of the base, shape (3, 6).
-
-        Equal to `Motion.evaluate`, but faster at a single time: integrators call `fun` tens of thousands of times.
-        """
+        """Displacement, velocity and acceleration of the base, shape (3, 6)."""
+        # Equal to `Motion.evaluate`, but faster at a single time: integrators call `fun` tens of thousands of times.
         knots, coefficients = self.motion.knots, self.motion.coefficients
         if not 0 <= t <= knots[-1]:
             self.motion.evaluate(t)  # raises the InputError for this time

@@ -153,10 +153,8 @@ def knot_jumps(knots: Array, coefficients: Array, derivative: int) -> tuple[Arra
 
 
 def _largest_in_vector(values: Array) -> Array:
-    """Largest magnitude over all pieces and the three components of a vector, repeated for each component.
-
-    `values` has shape (k, channels), the result (channels,).
-    """
+    """Largest magnitude over all pieces and the three components of a vector, repeated for each component."""
+    # `values` has shape (k, channels), the result (channels,).
     largest = np.abs(values).max(axis=0)
     return np.repeat(largest.reshape(-1, 3).max(axis=1), 3)
 

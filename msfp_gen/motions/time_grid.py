@@ -200,11 +200,9 @@ def _at(pieces: Array, local: Array, order: int) -> Array:
 
 
 def _deviations(knots: Array, pieces: Array, order: int, size: Array) -> Array:
-    """Relative deviation of a derivative at each inner knot, shape (k-1,).
-
-    It bounds the difference between the polynomials before and after the knot over the shorter of the two pieces, by
-    the jumps of all higher derivatives (Taylor), relative to `size`.
-    """
+    """Relative deviation of a derivative at each inner knot, shape (k-1,)."""
+    # It bounds the difference between the polynomials before and after the knot over the shorter of the two pieces,
+    # by the jumps of all higher derivatives (Taylor), relative to `size`.
     width = np.diff(knots)
     shorter, deviations = np.minimum(width[:-1], width[1:])[:, None, None], np.zeros(pieces[1:, ..., 0].shape)
     for d in range(order, ORDER):
@@ -236,11 +234,9 @@ def _degrees(pieces: Array, width: Array, size: Array) -> Indices:
 def _pieces_approximated(
     knots: Array, pieces: Array, kinked: Flags, sizes: Mapping[int, Array], direction: int
 ) -> Indices:
-    """Number of neighbouring pieces that the polynomial of each piece approximates: 0, 1, 2, 4 and so on.
-
-    It counts later pieces (direction 1) or earlier ones (-1). A piece approximates 2 s neighbours only if it
-    approximates s of them, the piece s further on approximates its s neighbours, and no kink lies between.
-    """
+    """Number of neighbouring pieces that the polynomial of each piece approximates: 0, 1, 2, 4 and so on."""
+    # It counts later pieces (direction 1) or earlier ones (-1). A piece approximates 2 s neighbours only if it
+    # approximates s of them, the piece s further on approximates its s neighbours, and no kink lies between.
     count = len(pieces)
     blocked = np.append(kinked, True) if direction > 0 else np.append(True, kinked)  # by a kink or the end
     approximated, candidate, stride = np.zeros(count, dtype=np.intp), ~blocked, 1

@@ -276,10 +276,8 @@ def attributes_of(
 
 
 def _encoding(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
-    """Checksums of all numbers, and compression of rows and of the pieces of a motion.
-
-    The lowest compression level suffices: histories of stuck surfaces and of rims repeat most values.
-    """
+    """Checksums of all numbers, and compression of rows and of the pieces of a motion."""
+    # The lowest compression level suffices: histories of stuck surfaces and of rims repeat most values.
     from msfp_gen.scene.file.stored_motion import COMPRESSED
 
     encoding: dict[Hashable, dict[str, Any]] = {}

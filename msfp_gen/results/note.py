@@ -148,10 +148,8 @@ def joined_notes(earlier: Iterable[Note], later: Iterable[Note]) -> list[Note]:
 
 
 def _changes(kind: str, before: Effects, after: Effects | None) -> list[str]:
-    """The effects that changed after a monitor tripped; after a jam these can be those of inertia or of uplift.
-
-    The monitors of a friction law change none, whatever another monitor changes at the same time.
-    """
+    """The effects that changed after a monitor tripped; after a jam these can be those of inertia or of uplift."""
+    # The monitors of a friction law change none, whatever another monitor changes at the same time.
     names = REQUIRED_EFFECTS["uplift"] if kind == "jammed" else REQUIRED_EFFECTS.get(kind, {})
     return [
         f"{name} = {getattr(after, name)}"

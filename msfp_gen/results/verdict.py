@@ -252,10 +252,8 @@ def _rims_are_modelled(one: Result) -> bool:
 
 
 def _travel(one: Result, limits: Limits) -> Iterator[Value]:
-    """Rims in contact at one time; one surface must be left to slide.
-
-    By the contacts that the run has located, of a building by the rows.
-    """
+    """Rims in contact at one time; one surface must be left to slide."""
+    # By the contacts that the run has located, of a building by the rows.
     allowed = float(len(one.extremes.gap) - 1)
     closed = (one.history.gap <= 0) | (one.history.rim_force > 0)
     counts = closed.sum(axis=1)
@@ -288,10 +286,8 @@ def _uplift_duration(one: Result, limits: Limits) -> Iterator[Value]:
 
 
 def _temperature(one: Result, limits: Limits) -> Iterator[Value]:
-    """Temperatures of the friction law, or of the monitor of heat where the law has none.
-
-    The monitor does not keep when its largest rise was reached; the time of its note is that of the first one.
-    """
+    """Temperatures of the friction law, or of the monitor of heat where the law has none."""
+    # The monitor does not keep when its largest rise was reached; the time of its note is that of the first one.
     reached, rows = one.extremes.temperature, one.history.temperature
     if reached is not None and rows is not None:
         yield from _by_surface(one, rows, reached, limits.temperature)

@@ -239,10 +239,8 @@ def _initial_sliding(scene: SceneFields) -> float:
 
 
 def _sliders(scene: SceneFields, requested: Auto, others: Effects, plane_until: float) -> Reason:
-    """Massless only where quasi-static steps apply: elsewhere leaving inertia out saves little and costs accuracy.
-
-    others: the effects selected before. plane_until: time at which a planar scene leaves its plane [s].
-    """
+    """Massless only where quasi-static steps apply: elsewhere leaving inertia out saves little and costs accuracy."""
+    # others: the effects selected before. plane_until: time at which a planar scene leaves its plane [s].
     if (fixed := _fixed(requested, "sliders")) is not None:
         return fixed
     if because := _requires_inertia(scene, others, plane_until):

@@ -127,10 +127,8 @@ def all_effects(scene: SceneFields) -> Effects:
 
 
 def _extended(scene: Requested, effects: Effects, name: str) -> Effects | None:
-    """Effects extended by those that the monitor `name` requires.
-
-    None where the scene fixes one of them, the method does not support it, or the model has them already.
-    """
+    """Effects extended by those that the monitor `name` requires."""
+    # None where the scene fixes one of them, the method does not support it, or the model has them already.
     requested = scene.effects
     if not isinstance(requested, Auto) or ("uplift" in REQUIRED_EFFECTS[name] and scene.solver.method == "dopri5"):
         return None

@@ -253,11 +253,9 @@ def checked_range(law: Law | None, bearing: Bearing, lower_load_limit: bool = Tr
 
 @lru_cache(maxsize=256)
 def _defect(law: Law, values: tuple[tuple[str, float], ...]) -> str | None:
-    """Why a law is not valid with the parameters of one surface, `mu` included; None where it is valid.
-
-    Over the `RANGES`, mu must be finite, positive where the reference coefficient is, and of finite slope. Results are
-    cached, since the surfaces of a bearing often have equal parameters.
-    """
+    """Why a law is not valid with the parameters of one surface, `mu` included; None where it is valid."""
+    # Over the `RANGES`, mu must be finite, positive where the reference coefficient is, and of finite slope. Results
+    # are cached, since the surfaces of a bearing often have equal parameters.
     points = _grid(law)
     at: dict[str, Any] = {**dict(values), **points}
     mu = coefficient(law, at)[0]

@@ -330,10 +330,8 @@ def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note,
 
 
 def _slides(history: History, yields: Array) -> NDArray[np.bool_]:
-    """Whether the bearing slides in each row: a surface that slides by less than its d_y at a time only creeps.
-
-    From `MOBILISED` friction grows to 99 % by then, where Coulomb friction would hold.
-    """
+    """Whether the bearing slides in each row: a surface that slides by less than its d_y at a time only creeps."""
+    # From `MOBILISED` friction grows to 99 % by then, where Coulomb friction would hold.
     slides = np.zeros(len(history.time), dtype=bool)
     for flags, slid, d_y in zip(sliding_surfaces(history).T, history.sliding.T, yields, strict=True):
         changes = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))

@@ -99,10 +99,8 @@ def _at_rest(model: Model, start: Start) -> Array:
 
 
 def _held_together(model: Model, start: Start) -> Array | None:
-    """Separations that do not accelerate, whose contacts are on the faces of their sliders; None: there are none.
-
-    Newton's method on separations and angular accelerations.
-    """
+    """Separations that do not accelerate, whose contacts are on the faces of their sliders; None: there are none."""
+    # Newton's method on separations and angular accelerations.
     stack = model.extension.Stack(start.gravity, start.bodies, start.surfaces, start.top)
     d = _at_rest(model, start)
     count, apart = len(d), [0, 2] if model.planar else [0, 1, 2]

@@ -231,10 +231,9 @@ def _finite(value: Any) -> float | None:
 
 
 class _Reader:
-    """Reads quantities of one run; summary and characterisation are computed when first needed.
+    """Reads quantities of one run; summary and characterisation are computed when first needed."""
 
-    problem: why a quantity of the characterisation has no value; "" where none was missing.
-    """
+    # problem: why a quantity of the characterisation has no value; "" where none was missing.
 
     def __init__(self, result: Any, keep: Keep) -> None:
         self.result = result

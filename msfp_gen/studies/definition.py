@@ -276,10 +276,8 @@ def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:
 
 
 def _tried_scenes(study: Study, factory: SceneFactory) -> Iterator[tuple[tuple[int, int] | None, System, Files]]:
-    """The scene of the first run, and for each tried value of an axis the scene with this value in the first run.
-
-    Yields (index of the axis, index of the value), None for the first run; the scene; and the files that it opened.
-    """
+    """The scene of the first run, and for each tried value of an axis the scene with this value in the first run."""
+    # Yields (index of the axis, index of the value), None for the first run; the scene; and the files that it opened.
     (base, _), *_ = study.task(0).rows(study.axes)
     named = ", ".join(f"{axis.name} = {value!r:.40}" for axis, value in zip(study.axes, base, strict=True))
     yield None, *_scene_and_files(factory, base, f"run 1 ({named})")
@@ -340,12 +338,10 @@ class Intensity:
 def _records(
     table: Any, folder: Path | None, progress: Progress | None
 ) -> tuple[list[Axis], dict[str, Table], dict[str, float], Table]:
-    """Read a table `[records]`. folder: of the study file. Raises InputError.
-
-    Returns four values, all empty for None: the axes `record` and, with scales, `scale`; name -> `[motion]` table of a
-    record, without the key `kind`, with absolute paths; name -> intensity measure at scale 1 [m/s^2], empty without
-    `intensity`; and the table `[records]` with motions in place of a suite file.
-    """
+    """Read a table `[records]`. folder: of the study file. Raises InputError."""
+    # Returns four values, all empty for None: the axes `record` and, with scales, `scale`; name -> `[motion]` table
+    # of a record, without the key `kind`, with absolute paths; name -> intensity measure at scale 1 [m/s^2], empty
+    # without `intensity`; and the table `[records]` with motions in place of a suite file.
     if table is None:
         return [], {}, {}, {}
     if not isinstance(table, Mapping):

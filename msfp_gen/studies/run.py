@@ -458,11 +458,9 @@ def study_status(folder: str | Path) -> Status:
 
 
 def _rate(folder: Path, written: dict[str, int]) -> tuple[float | None, bool]:
-    """Runs per second since the study was last started, and whether parts still appear.
-
-    Workers end their chunks in bunches, so that the time between two parts is no measure: the rate counts from the
-    start, which is the time of `study.toml`. written: name of a part -> number of its runs.
-    """
+    """Runs per second since the study was last started, and whether parts still appear."""
+    # Workers end their chunks in bunches, so that the time between two parts is no measure: the rate counts from the
+    # start, which is the time of `study.toml`. written: name of a part -> number of its runs.
     begin = (folder / STUDY_FILE).stat().st_mtime
     stamps = ((folder / name).stat().st_mtime for name in written)
     times = sorted((stamp, count) for stamp, count in zip(stamps, written.values(), strict=True) if stamp > begin)

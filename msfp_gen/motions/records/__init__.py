@@ -43,14 +43,12 @@ __all__ = [
 
 @dataclass(frozen=True)
 class _Format:
-    """A file format of channels.
+    """A file format of channels."""
 
-    Attributes:
-        name: name of the format.
-        matches: whether a file has this format.
-        read: reads the channels of a file.
-        notes: notes for every record of this format.
-    """
+    # name: name of the format.
+    # matches: whether a file has this format.
+    # read: reads the channels of a file.
+    # notes: notes for every record of this format.
 
     name: str
     matches: Callable[[Lines], bool]

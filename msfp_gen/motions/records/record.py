@@ -294,11 +294,9 @@ def _check_one_recording(channels: Sequence[Channel]) -> None:
 
 
 def _ordered(channels: list[Channel]) -> tuple[Channel | None, Channel | None, Channel | None]:
-    """Channels along E1, E2, E3 in a right-handed frame: E1 lies 90 degrees clockwise of E2 as seen from above.
-
-    Channels of unknown direction take the remaining places in their order. A component without a channel is None; that
-    is permitted only for files of one channel each.
-    """
+    """Channels along E1, E2, E3 in a right-handed frame: E1 lies 90 degrees clockwise of E2 as seen from above."""
+    # Channels of unknown direction take the remaining places in their order. A component without a channel is None;
+    # that is permitted only for files of one channel each.
     vertical = [c for c in channels if c.direction in (UP, DOWN)]
     horizontal = [c for c in channels if isinstance(c.direction, int)]
     undirected = [c for c in channels if c.direction == UNKNOWN]

@@ -155,19 +155,14 @@ def displacements(acceleration: Array, step: float, period: float, damping: floa
 
 
 def _recursion(step: float, frequency: float, damping: float) -> tuple[Array, Array, float]:
-    """Coefficients of the recursion of an oscillator, exact for a load p that is linear over each step.
-
-    The recursion is u[n] + a1 u[n-1] + a2 u[n-2] = b0 p[n] + b1 p[n-1] + b2 p[n-2]. One matrix exponential gives the
-    state x = (u, u') after a step as Phi x + G0 p[n] + G1 p[n+1]; the theorem of Cayley and Hamilton eliminates u'.
-
-    Args:
-        step: [s].
-        frequency: natural angular frequency [rad/s].
-        damping: ratio to the critical damping.
-
-    Returns:
-        b, a, and the factor of p[0] in u[1] from rest.
-    """
+    """Coefficients of the recursion of an oscillator, exact for a load p that is linear over each step."""
+    # The recursion is u[n] + a1 u[n-1] + a2 u[n-2] = b0 p[n] + b1 p[n-1] + b2 p[n-2]. One matrix exponential gives
+    # the state x = (u, u') after a step as Phi x + G0 p[n] + G1 p[n+1]; the theorem of Cayley and Hamilton eliminates
+    # u'.
+    # step: [s].
+    # frequency: natural angular frequency [rad/s].
+    # damping: ratio to the critical damping.
+    # Returns b, a, and the factor of p[0] in u[1] from rest.
     from scipy.linalg import expm
 
     system = np.zeros((4, 4))  # of u, u', p and the increment of p over the step

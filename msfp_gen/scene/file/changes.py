@@ -101,10 +101,8 @@ def _places(walk: _Walk, path: str) -> Iterator[_Place]:
 
 
 def _inner_places(walk: _Walk, inner: Any, keys: list[Key], common: Mapping[str, Any] = NO_TABLES) -> Iterator[_Place]:
-    """The places to which keys lead from `inner`, which is a copy, as all that they lead through becomes one.
-
-    common: the tables that rows of a kind of systems have where they have none of their own.
-    """
+    """The places to which keys lead from `inner`, which is a copy, as all that they lead through becomes one."""
+    # common: the tables that rows of a kind of systems have where they have none of their own.
     key, *rest = keys
     for step in [key] if isinstance(key, str) else _rows(inner, key):
         if not rest:

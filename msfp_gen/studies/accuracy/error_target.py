@@ -251,11 +251,10 @@ class _ModelErrorTooLargeError(Exception):
 
 
 class _Search:
-    """Runs of one scene at the candidate tolerances, each compared with a reference run.
+    """Runs of one scene at the candidate tolerances, each compared with a reference run."""
 
-    `index`: of a candidate tolerance, loosest first. Where the effects were selected (`Auto`), the reference runs model
-    all effects, so that the estimate includes the error of the selection.
-    """
+    # `index`: of a candidate tolerance, loosest first. Where the effects were selected (`Auto`), the reference runs
+    # model all effects, so that the estimate includes the error of the selection.
 
     def __init__(self, scene: Scene, target: float, deadline: float) -> None:
         self.scene, self.target, self.deadline = scene, target, deadline
@@ -292,11 +291,9 @@ class _Search:
         return self.references[index]
 
     def _with_short_steps(self, index: int) -> tuple[Scene, float]:
-        """The reference scene with steps of at most half the mean step of a run, and several in a slider's period.
-
-        Also the longest step over that half. Newton's method leaves a share of the tolerance as a residual in every
-        stage. What it leaves adds up over the steps, so the tolerance has to shrink with them.
-        """
+        """The reference scene with steps of at most half the mean step of a run, and several in a slider's period."""
+        # Also the longest step over that half. Newton's method leaves a share of the tolerance as a residual in every
+        # stage. What it leaves adds up over the steps, so the tolerance has to shrink with them.
         scene, half = self.reference_scene, self.reference_scene.end / (2 * max(self.trial(index).steps, 1))
         steps = [half, *([scene.solver.max_step] if scene.solver.max_step is not None else [])]
         if not self.filtered and STEPS_PER_PERIOD * scene.end <= MOST_STEPS * self.period:
@@ -346,10 +343,9 @@ class _Search:
         raise RunError(self._target_missed(), status="accuracy")
 
     def _check_model_error(self, index: int, first: int, trial: Trial) -> None:
-        """Raise _ModelErrorTooLargeError if the selected effects keep a run from its end or from the target.
-
-        They keep it from the target if two tighter tolerances did not reduce the error. first: index of the first run.
-        """
+        """Raise _ModelErrorTooLargeError if the selected effects keep a run from its end or from the target."""
+        # They keep it from the target if two tighter tolerances did not reduce the error. first: index of the first
+        # run.
         if self.reference_scene is self.scene:
             return
         if not trial.finished:

@@ -130,10 +130,8 @@ def _advance(solver: Any, times: Array, work: Work) -> Array:
 
 
 def _force_and_sliding(ode: Ode, times: Array, states: Array) -> tuple[Array, Array]:
-    """Horizontal force on the top support, shape (k, 2) [N], and sliding, shape (k, n-1) [m], of `states`.
-
-    The rows end before the first state at which no acceleration is found.
-    """
+    """Horizontal force on the top support, shape (k, 2) [N], and sliding, shape (k, n-1) [m], of `states`."""
+    # The rows end before the first state at which no acceleration is found.
     force, sliding = np.zeros((len(states), 2)), np.zeros((len(states), ode.count))
     for row, (t, y) in enumerate(zip(times, states, strict=False)):
         try:

@@ -96,10 +96,8 @@ class Series:
 
 
 def _updated_tilt(force: complex, tilt: complex, friction: float) -> complex:
-    """The tilt after `force` is applied: constant while |force - tilt| < friction, following the force beyond.
-
-    The corner at |force - tilt| = friction is rounded, since Newton's method does not converge over it.
-    """
+    """The tilt after `force` is applied: constant while |force - tilt| < friction, following the force beyond."""
+    # The corner at |force - tilt| = friction is rounded, since Newton's method does not converge over it.
     distance = abs(force - tilt)
     if not distance:
         return tilt
@@ -147,10 +145,8 @@ def run_series(scene: Scene, steps: int, arms: bool = False) -> Trial:
 
 
 def _trial(name: str, scene: Scene, steps: int, times: Array, columns: Array, seconds: float) -> Trial:
-    """The trial of a run in equal steps. times: of its steps; a run that failed ends before the scene.
-
-    columns: force [N] and sliding [m] at the times, shape (T, 2 + surfaces).
-    """
+    """The trial of a run in equal steps. times: of its steps; a run that failed ends before the scene."""
+    # columns: force [N] and sliding [m] at the times, shape (T, 2 + surfaces).
     at, last = comparison_times(scene.end), float(times[-1])
     at = at[at <= last * (1 + 1e-12)]
     rows = np.column_stack([np.interp(at, times, column) for column in columns.T])
@@ -183,10 +179,8 @@ def _run_rig(scene: Scene, series: Series, times: Array) -> tuple[Array, Array]:
 
 
 def _run_mass(scene: Scene, series: Series, times: Array) -> tuple[Array, Array]:
-    """Integrate a mass on the bearing by central differences; the axial load follows the vertical acceleration.
-
-    Returns as `_run_rig`.
-    """
+    """Integrate a mass on the bearing by central differences; the axial load follows the vertical acceleration."""
+    # Returns as `_run_rig`.
     top = scene.top
     assert isinstance(top, MassTop)
     ground, count, step = scene.motion.acceleration(times), scene.bearing.layout.surfaces, float(times[1])
@@ -274,10 +268,8 @@ def _define_model(ops: Any, scene: Scene, lower: Link, upper: Link, inner: Link)
 
 
 def _integrate(ops: Any, scene: Scene, times: Array) -> tuple[int, Array]:
-    """Apply the axial load, then the motion; returns the number of steps, and the horizontal forces, (k, 2) [N].
-
-    The first row is the start, with zero force.
-    """
+    """Apply the axial load, then the motion; returns the number of steps, and the horizontal forces, (k, 2) [N]."""
+    # The first row is the start, with zero force.
     ops.timeSeries("Linear", 1)
     ops.pattern("Plain", 1, 1)
     ops.load(TOP, 0.0, 0.0, -_load(scene), 0.0, 0.0, 0.0)

@@ -134,10 +134,8 @@ def _check(log_x: Array, runs: Array, over: Array, where: str) -> None:
 
 
 def _newton(rows: Array, runs: Array, over: Array, start: Array, where: str) -> tuple[Array, Array]:
-    """Maximise the likelihood by Fisher scoring, with steps halved until it grows; returns solution and information.
-
-    rows: of the design matrix, shape (levels, 2). where: of the fit, for a message.
-    """
+    """Maximise the likelihood by Fisher scoring, with steps halved until it grows; returns solution and information."""
+    # rows: of the design matrix, shape (levels, 2). where: of the fit, for a message.
     from scipy.special import log_ndtr
 
     def likelihood(x: Array) -> float:
@@ -346,11 +344,9 @@ def _state(
 
 
 def _bootstrap(levels: Array, level_of_run: Any, exceeded: Any, fit: Fit, groups: Any, count: int, seed: int) -> Array:
-    """Coefficients of `count` fits to clusters drawn with replacement, shape (count, 2) [-].
-
-    levels: ln x. level_of_run, exceeded, groups: of every run, its index in `levels`, whether it exceeds, and its
-    cluster. Clusters that determine no curve are drawn again. Raises InputError.
-    """
+    """Coefficients of `count` fits to clusters drawn with replacement, shape (count, 2) [-]."""
+    # levels: ln x. level_of_run, exceeded, groups: of every run, its index in `levels`, whether it exceeds, and its
+    # cluster. Clusters that determine no curve are drawn again. Raises InputError.
     clusters, cluster_of_run = np.unique(groups, return_inverse=True)
     shape = (len(clusters), len(levels))
     runs, over = np.zeros(shape), np.zeros(shape)

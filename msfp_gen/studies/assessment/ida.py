@@ -121,10 +121,8 @@ def _fractile(values: Array, share: float) -> Array:
 
 
 def _common_intensities(curves: list[Curve], side: Side) -> Array:
-    """The intensities of the fractiles: of the curves if equal in all, else a grid to the end of the shortest curve.
-
-    A curve with a run that ended early counts as longer than any other.
-    """
+    """The intensities of the fractiles: of the curves if equal in all, else a grid to the end of the shortest curve."""
+    # A curve with a run that ended early counts as longer than any other.
     first = np.unique(curves[0][0])
     if all(np.array_equal(np.unique(x), first) for x, _, _ in curves):
         return first
@@ -135,10 +133,8 @@ def _common_intensities(curves: list[Curve], side: Side) -> Array:
 
 
 def _interpolated(levels: Array, x: Array, y: Array, ended: Any, side: Side) -> Array:
-    """The demand of a curve at intensities `levels`, linear between its runs, shape of `levels`.
-
-    Infinite beyond the last run before the first run that ended early, of a least value minus infinity.
-    """
+    """The demand of a curve at intensities `levels`, linear between its runs, shape of `levels`."""
+    # Infinite beyond the last run before the first run that ended early, of a least value minus infinity.
     beyond = -np.inf if side == "least" else np.inf
     first_early = x[~ended].min(initial=np.inf)
     known = ended & (x < first_early)
@@ -149,10 +145,8 @@ def _interpolated(levels: Array, x: Array, y: Array, ended: Any, side: Side) -> 
 
 
 def _curve_numbers(rows: Any, measure: str) -> Any:
-    """The number of the curve of each run, from 1; runs of a curve have the values of all axes but the intensity equal.
-
-    The axes are the columns between `run` and `status`.
-    """
+    """The number of the curve of each run, from 1; runs of a curve differ in intensity alone."""
+    # The axes are the columns between `run` and `status`.
     names = list(rows.columns)
     check_columns(("run", "status"), names)
     changing = {measure, SCALE} if measure == INTENSITY else {measure}

@@ -257,10 +257,8 @@ def _bounded_bearing(bearing: Bearing, law: Law | None, *, table: FactorTable, c
 
 
 def _with_friction(bearing: Bearing, factors: tuple[float, ...]) -> Bearing:
-    """The bearing with its coefficients multiplied where the scene gives them, at the surfaces or at the pivot.
-
-    A second coefficient of a friction law takes the factor of the first, so that the law is multiplied as a whole.
-    """
+    """The bearing with its coefficients multiplied where the scene gives them, at the surfaces or at the pivot."""
+    # A second coefficient of a friction law takes the factor of the first, so that the law is multiplied as a whole.
     if bearing.friction_given_at == "pivot":
         sheet = [mu * factor for mu, factor in zip(_given_friction(bearing), factors, strict=True)]
         changed = bearing.replace(friction=sheet, friction_at="pivot")

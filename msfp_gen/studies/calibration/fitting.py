@@ -257,10 +257,8 @@ def solve(residuals: Residuals, start: Array, low: Array, high: Array, most: int
 def _steps(
     residuals: Residuals, x: Array, at: Evaluation, free: NDArray[np.bool_], low: Array, high: Array
 ) -> tuple[Array, Evaluation]:
-    """Step from an evaluation at x, with its Jacobian, until a step is within the errors or reduces nothing.
-
-    free: the unknowns that move. Returns the last x, and the evaluation there.
-    """
+    """Step from an evaluation at x, with its Jacobian, until a step is within the errors or reduces nothing."""
+    # free: the unknowns that move. Returns the last x, and the evaluation there.
     for _ in range(STEPS):
         step = np.clip(x + at.step(free), low, high) - x
         if at.step_in_errors(step) < WITHIN:

@@ -68,11 +68,10 @@ def noise_of(residuals: Sequence[Array], bases: Sequence[Array]) -> list[Noise]:
 
 
 def _noise(sums: Array, basis: Array, least: float = 0.0) -> Noise:
-    """The noise of a test. sums: over lags. basis: its rows in the orthonormal basis of the Jacobian.
-
-    Two autoregressions are compared: of order one, which is stable with few rows, and of the order by the information
-    criterion of Akaike, which sees slow parts below white noise. The noise has the fewer effective rows of the two.
-    """
+    """The noise of a test. sums: over lags. basis: its rows in the orthonormal basis of the Jacobian."""
+    # Two autoregressions are compared: of order one, which is stable with few rows, and of the order by the
+    # information criterion of Akaike, which sees slow parts below white noise. The noise has the fewer effective rows
+    # of the two.
     rows = len(basis)
     if sums[0] <= 0:
         return Noise(least / rows, np.eye(1, rows)[0], 1.0)
@@ -88,10 +87,8 @@ def _noise(sums: Array, basis: Array, least: float = 0.0) -> Noise:
 
 
 def _by_akaike(lags: Array, rows: int) -> Array:
-    """Autocorrelation at all lags, shape (rows,) [-], of the autoregression with these first lags (Yule-Walker).
-
-    Of the stationary orders (Levinson and Durbin), its order has the least criterion of Akaike.
-    """
+    """Autocorrelation at all lags, shape (rows,) [-], of the autoregression with these first lags (Yule-Walker)."""
+    # Of the stationary orders (Levinson and Durbin), its order has the least criterion of Akaike.
     weights = best = np.zeros(0)
     remainder, least = 1.0, 0.0
     for order in range(1, len(lags)):
@@ -112,10 +109,8 @@ def _by_akaike(lags: Array, rows: int) -> Array:
 
 
 def _bias(basis: Array, spread: Array, inner: Array) -> Array:
-    """Bias of the sums over lags of one test, shape (T,): sums of Omega - M Omega M with M = 1 - Q Q'.
-
-    basis: Q. spread: Omega Q. inner: Q' Omega Q.
-    """
+    """Bias of the sums over lags of one test, shape (T,): sums of Omega - M Omega M with M = 1 - Q Q'."""
+    # basis: Q. spread: Omega Q. inner: Q' Omega Q.
     return _lag_sums(basis, spread) + _lag_sums(spread, basis) - _lag_sums(basis @ inner, basis)
 
 

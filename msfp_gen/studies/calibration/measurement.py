@@ -128,10 +128,8 @@ def read_measurement(
 def _rows(
     lines: Lines, head: int, separator: str, header: list[str], places: Mapping[str, tuple[int, float]]
 ) -> list[list[float]]:
-    """Time, displacement and force of every row [units of the file]. head: index of the header line.
-
-    places: name -> (index of the column, factor of its unit to SI). Raises InputError.
-    """
+    """Time, displacement and force of every row [units of the file]. head: index of the header line."""
+    # places: name -> (index of the column, factor of its unit to SI). Raises InputError.
     rows, last_cells, end = [], [], head
     for index in range(head + 1, len(lines)):
         if not lines[index].strip() or lines[index].lstrip().startswith("#"):

@@ -226,13 +226,11 @@ def cheaper_models(study: Study) -> list[str]:
 
 
 class _State:
-    """The models of an estimate and the numbers of their runs: both run the same draws, from the first.
+    """The models of an estimate and the numbers of their runs: both run the same draws, from the first."""
 
-    Attributes:
-        cheap: the cheap model; None: exact runs only.
-        exact, many: numbers of runs of the exact and of the cheap model.
-        early: model -> runs that ended early.
-    """
+    # cheap: the cheap model; None: exact runs only.
+    # exact, many: numbers of runs of the exact and of the cheap model.
+    # early: model -> runs that ended early.
 
     def __init__(self, source: Source, question: Question) -> None:
         self.source, self.question = source, question
@@ -382,11 +380,9 @@ class _BudgetError(InputError):
 
 
 def _plan_round(state: _State, moment: Moment, spent: float) -> bool:
-    """Plan the next round, and return whether there is one. spent: core time so far [s].
-
-    Raises _BudgetError where the pilot alone shows that the budget does not permit the target. After the pilot the
-    estimate ends with the budget, and a note says so.
-    """
+    """Plan the next round, and return whether there is one. spent: core time so far [s]."""
+    # Raises _BudgetError where the pilot alone shows that the budget does not permit the target. After the pilot the
+    # estimate ends with the budget, and a note says so.
     question, half, exact = state.question, moment.half, state.exact
     models = (EXACT,) if state.cheap is None else (EXACT, state.cheap)
     costs = np.array([state.source.cost(level) for level in models])
