@@ -3,7 +3,7 @@
 | stage | module | input -> output |
 |---|---|---|
 | derive, lower, emit | `msfp_gen.generator` | ModelSpec -> sources |
-| compile | `msfp_gen.jit.compiler` | sources, runtime's C -> extension; object of the wrapper, kept for all |
+| compile | `msfp_gen.jit.compiler` | sources, runtime's C -> extension; objects, kept for other models |
 | store | `msfp_gen.jit.cache` | folder -> entry with a manifest |
 | load | `msfp_gen.jit.build` | extension -> imported module |
 
@@ -213,7 +213,7 @@ void *PyInit_{module}(void) {{ return PyInit_msfp_module(); }}
 
 
 def kept_wrapper(files: Mapping[str, str], inputs: Mapping[str, Any]) -> Path:
-    """Where the cache keeps the object of a wrapper, `wrapper-<key>.o`.
+    """Where the cache keeps the object of a wrapper, `objects/wrapper-<key>.o`.
 
     files: of the generator; inputs: of the entry that is built. The key covers all that the object is made from: the
     wrapper with the headers that it includes, and the tools.
@@ -222,7 +222,7 @@ def kept_wrapper(files: Mapping[str, str], inputs: Mapping[str, Any]) -> Path:
     texts = {name: files[name] for name in _included(wrapper, files)}
     tools = {name: inputs[name] for name in ("compiler", "abi")} | {"cython": inputs["tools"]["cython"]}
     key = cache.digest_files({**texts, "": json.dumps([tools, inputs["flags"]["wrapper"]])})
-    return cache.cache_root() / f"wrapper-{key[:20]}.o"
+    return cache.objects_folder() / f"wrapper-{key[:20]}.o"
 
 
 def _included(name: str, files: Mapping[str, str]) -> set[str]:
@@ -267,6 +267,7 @@ def _build(spec: ModelSpec, entry: cache.Entry, folder: Path, notify: Progress) 
         ),
         entry.inputs["processor"],
         kept=kept_wrapper(generated.files, entry.inputs),
+        shared=cache.objects_folder(),
     )
     manifest = cache.Manifest(
         module=entry.module,

@@ -105,6 +105,11 @@ def cache_root() -> Path:
     return user_cache_path("msfp-gen") / "models"
 
 
+def objects_folder() -> Path:
+    """Folder of the objects that models share: of C files by their preprocessed text, and of the wrapper."""
+    return cache_root() / "objects"
+
+
 def module_name(spec: ModelSpec) -> str:
     """Name of the extension module, `msfp_<n>_<m>_<p>`."""
     return f"msfp_{spec.layout.name}"
@@ -308,7 +313,6 @@ def _compiler(module: str, inputs: dict[str, Any]) -> list[str]:
 
 
 # Models, those for batches in vector lanes of earlier versions, and unfinished ones.
-_WRAPPER = re.compile(r"wrapper-[0-9a-f]{20}\.o")
 _NAME = re.compile(r"(msfp_\d+_\d+_\d+(?:_lanes\d+)?-[0-9a-f]{20})(\.part-\d+)?")
 DAY = 86400.0
 
@@ -364,7 +368,7 @@ def prune(days: float) -> tuple[list[CachedModel], list[CachedModel]]:
     """
     if not days >= 0:
         raise InputError(f"days = {days}: give a number of days, 0 or more")
-    _remove_wrappers(days)
+    _remove_objects(days)
     removed: list[CachedModel] = []
     in_use: list[CachedModel] = []
     for item in cached_models():
@@ -426,13 +430,15 @@ def _remove(folder: Path) -> bool:
         return not (folder.exists() or renamed.exists())
 
 
-def _remove_wrappers(days: float) -> None:
-    """Delete the objects of wrappers that were not used for `days` days."""
-    root = cache_root()
+def _remove_objects(days: float) -> None:
+    """Delete the objects that were not used for `days` days."""
+    root = objects_folder()
     for path in root.iterdir() if root.is_dir() else ():
         with suppress(OSError):
-            if _WRAPPER.fullmatch(path.name) and path.stat().st_mtime <= time.time() - days * 86400.0:
+            if path.stat().st_mtime <= time.time() - days * DAY:
                 path.unlink()
+    with suppress(OSError):  # only an empty folder goes
+        root.rmdir()
 
 
 def _remove_locks() -> None:

@@ -170,6 +170,7 @@ def compile_extension(
     processor: Sequence[str] = (),
     libraries: Sequence[str] = (),
     kept: Path | None = None,
+    shared: Path | None = None,
 ) -> Path:
     """Write `sources` into `folder` and build the extension `module` there.
 
@@ -190,6 +191,8 @@ def compile_extension(
     kept
         Where the object of the wrapper is kept for other extensions with the same one. It is used where the file is as
         it was written, and written otherwise.
+    shared
+        Folder where objects of C files are kept for other extensions, see `compile_once`. None: none are.
 
     Returns
     -------
@@ -218,7 +221,15 @@ def compile_extension(
         write_bytes(folder / object_file(wrapper), [known])
     else:
         chains.insert(0, _wrapper_steps(wrapper, compiler, include))
-    for done in run_parallel(chains, log.run):
+
+    def run(step: Step) -> None:
+        # Flags of the user may write more than the object.
+        if shared is None or FLAGS["user"] or step.subject not in units:
+            log.run(step)
+        else:
+            compile_once(step.subject, compiler, c_flags, log, shared)
+
+    for done in run_parallel(chains, run):
         if progress is not None:
             progress(done, len(chains))
     objects = [object_file(name) for name in [*units, wrapper]]
@@ -249,7 +260,8 @@ def read_kept(path: Path) -> bytes | None:
 
 
 def _keep(path: Path, content: bytes) -> None:
-    write_bytes(path, [hashlib.sha256(content).hexdigest().encode(), b"\n", content])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(path, [hashlib.sha256(content).hexdigest().encode(), b"\n", content], tidy=False)
 
 
 class Log:
@@ -313,6 +325,24 @@ def run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) 
 def compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> Step:
     """Compilation of one C file; the object lies beside it."""
     return Step(name, (*compiler.command, *flags, "-c", name, "-o", object_file(name)))
+
+
+def compile_once(name: str, compiler: Compiler, flags: Sequence[str], log: Log, shared: Path) -> None:
+    """Compile one C file, or take the object of the same preprocessed text by the same compiler from `shared`.
+
+    Most files of the runtime read of a model its dimensions alone, and an edit of one leaves the text of the others.
+    """
+    text, target = log.folder / f"{name}.i", log.folder / object_file(name)
+    log.run(Step(name, (*compiler.command, *flags, "-E", "-P", name, "-o", text.name)))
+    inputs = f"{compiler.command} {compiler.path} {compiler.version} {flags}\0{name}\0".encode()
+    path = shared / f"{hashlib.sha256(inputs + text.read_bytes()).hexdigest()[:40]}.o"
+    text.unlink()
+    known = read_kept(path)
+    if known is not None:
+        write_bytes(target, [known], tidy=False)
+        return
+    log.run(compile_step(name, compiler, flags))
+    _keep(path, target.read_bytes())
 
 
 def _wrapper_steps(wrapper: str, compiler: Compiler, include: Path) -> list[Step]:

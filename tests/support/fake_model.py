@@ -93,9 +93,9 @@ def prebuilt(factory: pytest.TempPathFactory) -> Path:
 
 def keep_wrapper(prebuilt: Path, models: Path) -> None:
     """Copy the object of the wrapper from one cache into another."""
-    models.mkdir(exist_ok=True)
-    for path in prebuilt.glob("wrapper-*.o"):
-        shutil.copy2(path, models)
+    (models / "objects").mkdir(parents=True, exist_ok=True)
+    for path in prebuilt.glob("objects/wrapper-*.o"):
+        shutil.copy2(path, models / "objects")
 
 
 if __name__ == "__main__":

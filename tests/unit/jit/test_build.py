@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -65,7 +66,7 @@ def refuse_generator(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def entry_of(models: Path) -> Path:
-    return next(path for path in models.iterdir() if path.is_dir())
+    return next(path for path in models.glob("msfp_*") if path.is_dir())
 
 
 # --- building
@@ -192,6 +193,29 @@ def test_a_header_of_the_wrapper_decides_which_object_is_used(models: Path) -> N
         path = build.kept_wrapper({**files, name: text + "\n"}, inputs)
         assert (path == known) == (name in ("msfp_kernels.c", "msfp_symbols.h")), name
     assert build.kept_wrapper(files, inputs | {"compiler": ["other"]}) != known
+
+
+def compiled(info: build.BuildInfo) -> set[str]:
+    """The C files that the compiler compiled for a model."""
+    return set(re.findall(r" -c (\w+\.c) ", (info.folder / "build.log").read_text()))
+
+
+def test_a_file_of_the_same_preprocessed_text_is_compiled_once(wrapper: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert compiled(build.prepare(SPEC)) == {"unit.c", "msfp_kernels.c", "msfp_entry.c"}
+    break_generator(monkeypatch, kernel=fake_model.KERNEL + "/* nothing but a comment */\n")
+    assert compiled(build.prepare(ModelSpec(Layout.tfp()))) == {"msfp_entry.c"}
+    break_generator(monkeypatch, kernel=fake_model.KERNEL.replace("return ", "return 2.0 * "))
+    other = build.prepare(ModelSpec(Layout(2, 1, 0)))
+    assert compiled(other) == {"msfp_kernels.c", "msfp_entry.c"}
+    assert build.load_extension(other.path, other.module).twice(2.0) == 8.0
+    for path in cache.objects_folder().glob("*.o"):
+        path.write_bytes(path.read_bytes()[: None if path.name.startswith("wrapper-") else -1])
+    shutil.rmtree(other.folder)
+    again = build.prepare(ModelSpec(Layout(2, 1, 0)))
+    assert compiled(again) == {"unit.c", "msfp_kernels.c", "msfp_entry.c"}, "a damaged object is not used"
+    monkeypatch.setitem(compiler.FLAGS, "user", ("--coverage",))
+    shutil.rmtree(again.folder)
+    assert (build.prepare(ModelSpec(Layout(2, 1, 0))).folder / "unit.gcno").is_file(), "a flag that writes more"
 
 
 # --- failures
