@@ -13,8 +13,10 @@ from msfp_gen.cli.console import (
     AsJson,
     Progress,
     SceneName,
+    Workers,
     answer,
     build,
+    kept,
     load_source,
     note,
     note_exceeded,
@@ -62,6 +64,7 @@ def characterise(
 @app.command(
     epilog="Examples:\n\n\b\n  msfp-gen bound fenz-test5\n  msfp-gen bound scene.toml --factors mine.toml -o bounds\n"
     "  msfp-gen bound scene.toml --suite suite.toml -o bounds   # means and envelopes over the records of a suite\n"
+    "  msfp-gen bound scene.toml --suite suite.toml -o bounds --leave-out CLC\n"
     "  msfp-gen factors asce7 > mine.toml   # a table to edit"
 )
 def bound(
@@ -82,12 +85,22 @@ def bound(
         Path | None,
         typer.Option(metavar="FILE", help="Under every motion of a suite (TOML): means, worst values, envelopes."),
     ] = None,
+    leave_out: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RECORD", help="A record of the suite that is not run and in no mean; may be repeated."),
+    ] = None,
+    workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run a scene at lower bound, nominal and upper bound properties, of its data sheet or by factors of a code."""
+    """Run a scene at lower bound, nominal and upper bound properties, of its data sheet or by factors of a code.
+
+    Under a suite, -o keeps the numbers of each run as it ends: the same command continues where it was interrupted.
+    """
     if suite is not None:
-        _bound_suite(scene, factors, output, suite, as_json)
+        _bound_suite(scene, factors, output, suite, leave_out or (), workers, as_json)
         return
+    if leave_out or workers is not None:
+        raise InputError(f"--{'leave-out' if leave_out else 'workers'}: it is for the runs of a suite; give --suite")
     from msfp_gen.common.output import make_folder
     from msfp_gen.scene.file.source import load_scene
     from msfp_gen.studies.bounding import load_factors
@@ -126,35 +139,43 @@ def factors(
         say(factor_text(name).rstrip("\n"))
 
 
-def _bound_suite(scene: str, factors: str | None, output: Path | None, suite: Path, as_json: bool) -> None:
-    """`bound` under every motion of a suite: numbers and the figure, without the rows of the runs."""
+def _bound_suite(
+    scene: str,
+    factors: str | None,
+    output: Path | None,
+    suite: Path,
+    leave_out: Sequence[str],
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """`bound` under every motion of a suite: numbers and the figure, without the rows in time of the runs."""
     from msfp_gen.common.output import make_folder
-    from msfp_gen.scene.file.loader import load_suite
-    from msfp_gen.studies.batch import build_models
-    from msfp_gen.studies.bounding import bounded_scenes, factors_of, load_factors
+    from msfp_gen.scene.file.source import load_scene
+    from msfp_gen.studies.bounding import factors_of
     from msfp_gen.studies.bounding import suite as module
-    from msfp_gen.studies.sweep import variations
 
-    given = None if factors is None else load_factors(factors)
+    chosen = factors_of(load_scene(scene)).name if factors is None else factors
     with Progress("suite") as progress:
-        records = load_suite(suite, progress).records
-    scenes = {str(variation.varied["record"]): variation.scene for variation in variations(scene, (), records)}
-    table = factors_of(next(iter(scenes.values()))) if given is None else given
-    for chosen in scenes.values():
-        bounded_scenes(chosen, table)
+        study = module.suite_study(scene, suite, chosen, progress)
+    module.check_left_out(leave_out, study)
     if output is not None:
         make_folder(output, "--output")
-    build_models(scenes.values())
-    with Progress(f"{len(scenes)} records") as progress:
-        bounds = module.bound_suite(scenes, table, name=Path(scene).stem, progress=progress)
+    build(study.scene(1))
+    with kept(output), Progress(f"{len(study.inputs.records)} records at their bounds") as update:
+        bounds = module.bound_suite(study, output, leave_out=leave_out, workers=workers, progress=update)
     answer(bounds.as_dict(), module.suite_bound_tables(bounds), as_json)
     if output is not None:
         module.plot_suite_bounds(bounds, output / "suite.png")
         numbers = module.write_statistics(bounds, output / "suite.csv")
         note_written([numbers, module.write_records(bounds, output / "records.csv"), output / "suite.png"])
     if bounds.failures:
+        records = dict.fromkeys(record for record, _ in bounds.failures)
         (record, case), message = next(iter(bounds.failures.items()))
-        raise RunError(f"{len(bounds.failures)} runs did not reach their end; the first: {record}, {case}: {message}")
+        count = len(bounds.failures)
+        what = "1 run did not reach its end" if count == 1 else f"{count} runs did not reach their end; the first"
+        others = "".join(f" --leave-out {record}" for record in records) if len(records) < len(bounds.records) else ""
+        remedy = f"; for numbers of the other records:{others}" if others else ""
+        raise RunError(f"{what}: {record}, {case}: {message}{remedy}")
 
 
 @app.command(
@@ -222,11 +243,10 @@ def fit(
     with line as update:
 
         def show_evaluation(count: int, share: float, deviation: float) -> None:
-            assert update is not None
             line.name = f"evaluation {count}" + (f", deviation {deviation:.4g} N" if deviation == deviation else "")
             update(share, 1.0)
 
-        prepared.progress = None if update is None else show_evaluation
+        prepared.progress = show_evaluation
         result = end_fit(chosen, prepared)
     answer(result.as_dict(), fit_tables(result), as_json)
     written = [] if output is None else result.save(output)

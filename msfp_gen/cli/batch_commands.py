@@ -107,8 +107,7 @@ def _run(chosen: Sequence[Variation], workers: int | None, folder: Path | None, 
             if file is not None:
                 result.save(file)
             rows.append(row)
-            if progress is not None:
-                progress(len(rows), len(chosen))
+            progress(len(rows), len(chosen))
     if folder is not None:
         note(f"wrote {sum(bool(row.file) for row in rows)} runs to {folder}")
 

@@ -167,28 +167,60 @@ def note_written(paths: Iterable[Path]) -> None:
         note(f"wrote {path}")
 
 
+@contextmanager
+def kept(output: Path | None) -> Iterator[None]:
+    """Say where the runs of a study are if the block is interrupted. output: its folder; None: nowhere."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        where = "nothing is kept without --output" if output is None else f"what is done is kept in {output}"
+        note(where + ("" if output is None else "; the same command continues"))
+        raise
+
+
 class Progress:
-    """Progress on one line of a terminal: per cent done, and after a second the time left; silent elsewhere."""
+    """Progress in per cent, which never falls, and after a second the time left.
+
+    On a terminal it is one line; elsewhere there is a line every `EVERY` seconds. terminal: which of the two.
+    """
 
     def __init__(self, name: str) -> None:
         self.name = printable(name)
         self._shown = ("", -1)
+        self._whole = 0.0  # expected time of the whole [s]; 0: not known yet
         self._begin = monotonic()
+        self._over = threading.Event()
+        self.terminal = sys.stderr.isatty()
 
-    def __enter__(self) -> Callable[[float, float], None] | None:
-        return self._update if sys.stderr.isatty() else None
+    def __enter__(self) -> Callable[[float, float], None]:
+        if not self.terminal:
+            threading.Thread(target=self._report, daemon=True).start()
+        return self._update
 
     def __exit__(self, *_: object) -> None:
-        if self._shown[1] >= 0:
+        self._over.set()
+        if self.terminal and self._shown[1] >= 0:
             typer.echo("\r\x1b[K", nl=False, err=True)
 
     def _update(self, time: float, end: float) -> None:
-        percent = int(100 * time / end)
+        name, before = self._shown
+        percent = max(int(100 * time / end), before if name == self.name else 0)
         if (self.name, percent) != self._shown:
             self._shown = self.name, percent
             elapsed = monotonic() - self._begin
-            left = f", {elapsed * (end / time - 1):.0f} s left" if elapsed > 1 and time > 0 else ""
-            typer.echo(f"\r\x1b[K{self.name}: {percent} %{left}", nl=False, err=True)
+            self._whole = elapsed * end / time if elapsed > 1 and time > 0 else 0.0
+            if self.terminal:
+                typer.echo(f"\r\x1b[K{self._line}", nl=False, err=True)
+
+    @property
+    def _line(self) -> str:
+        left = self._whole - (monotonic() - self._begin)
+        return f"{self.name}: {self._shown[1]} %" + (f", {left:.0f} s left" if left >= 0.5 else "")
+
+    def _report(self) -> None:
+        while not self._over.wait(EVERY):
+            if self._shown[1] >= 0:
+                note(self._line)
 
 
 @contextmanager
@@ -201,10 +233,9 @@ def building(kept: bool = True) -> Iterator[Callable[[str, float], None]]:
 
     def report(doing: str, share: float) -> None:
         nonlocal task
-        if update is not None:
-            line.name = printable(doing)
-            update(share, 1.0)
-        elif doing.partition(" ")[0] != task:
+        line.name = printable(doing)
+        update(share, 1.0)
+        if not line.terminal and doing.partition(" ")[0] != task:
             note(doing)
         task = doing.partition(" ")[0]
 
@@ -285,6 +316,7 @@ def result_of(loaded: AnyResult | System) -> tuple[Any, RunError | None]:
 
 # SIGHUP does not exist on all platforms. Python itself handles SIGINT.
 _SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+EVERY = 10.0  # time between two lines of progress where there is no terminal [s]
 REPEAT = 0.05  # time after which an interrupt that was lost is repeated [s]
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from msfp_gen.cli.console import AsJson, Progress, Workers, answer, note, number, numbers, say
+from msfp_gen.cli.console import AsJson, Progress, Workers, answer, kept, note, number, numbers, say
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.common.tables import TABLE_SUFFIXES
@@ -125,20 +124,10 @@ def run(
         return
     if plot is not None:
         raise InputError("--plot: it draws an estimate; give --estimate too")
-    with _kept(output), Progress(f"{definition.runs} runs") as progress:
+    with kept(output), Progress(f"{definition.runs} runs") as progress:
         done = module.study(definition, output, shard=part, progress=progress, **engine)
     judged = any(column.name == "limits_exceeded" for column in definition.keep.columns)
     _report(done, output, as_json, judged)
-
-
-@contextmanager
-def _kept(output: Path) -> Iterator[None]:
-    """Say where the runs are if the block is interrupted."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        note(f"what is done is kept in {output}; the same command continues")
-        raise
 
 
 def _estimate(definition: Study, output: Path, options: dict[str, Any], plot: Path | None, as_json: bool) -> None:
@@ -146,7 +135,7 @@ def _estimate(definition: Study, output: Path, options: dict[str, Any], plot: Pa
     from msfp_gen.studies.estimation.estimate import estimate, estimate_table, plot_estimate
 
     _check(plot, None)
-    with _kept(output):
+    with kept(output):
         result = estimate(definition, output, **options)
     answer(result.as_dict(), [estimate_table(result)], as_json)
     for line in result.notes:

@@ -49,6 +49,7 @@ RUN = {
     "peak_force_ratio": Quantity("", "peak_force_ratio", extreme="most"),
     "rims_met": Quantity("", "rims_met", kept=True),
     "verdict": Quantity("", "verdict.word"),
+    "verdict_text": Quantity("", "verdict.text"),
     "limits_exceeded": Quantity("", "verdict.limits", kept=True),
     "closure_error": Quantity("", "energy.closure_error"),
     "steps": Quantity("", "counters.steps", extreme="most"),

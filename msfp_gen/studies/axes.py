@@ -25,8 +25,8 @@ from msfp_gen.scene.file.changes import changed_table, keys_of, multiplied_table
 from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.scene.file.source import located_value, scene_of
 from msfp_gen.scene.system import System
-from msfp_gen.studies.bounding import bounded_scene
 from msfp_gen.studies.bounding.factors import FactorTable
+from msfp_gen.studies.bounding.runs import scene_of_case
 
 WITHIN = (2.0**-53, 1 - 2.0**-53)  # least and largest probability at which every distribution has a finite value
 MOST = 10_000_000  # samples; each takes 8 bytes for each random axis, in the process that starts the study
@@ -437,7 +437,7 @@ class SceneFactory:
         scene = scene_of({key: value for key, value in table.items() if key != "fidelity"}, **self._fixed)
         for axis, value in pairs:
             if axis.change == "factors":
-                scene = bounded_scene(scene, self.inputs.factors[axis.paths[0]], value)
+                scene = scene_of_case(scene, self.inputs.factors[axis.paths[0]], value)
         self._check_motions(scene)
         reduced: System = at_fidelity(scene, level)
         return reduced

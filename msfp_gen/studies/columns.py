@@ -41,18 +41,19 @@ EXTREMES: dict[str, Callable[[Any], Any]] = {
     "last": lambda values: values[-1],
 }
 _EXTREME = re.compile(rf"\b({'|'.join(EXTREMES)})\(\s*([^()]*?)\s*\)")
-TEXTS = ("rims_met", "verdict", "limits_exceeded")
+TEXTS = ("rims_met", "verdict", "verdict_text", "limits_exceeded")
 _LEFT_OUT = ("status", "message")  # every row has them
 _OPERATIONS = {**formula.FLOAT_OPERATIONS, "power": math.pow}
 
 
 def usual_names(sources: Mapping[str, Source]) -> tuple[str, ...]:
     """Names of the quantities that a study keeps where its file names none."""
-    kept = [
-        name if source.place is None else name.rpartition("_")[0]
-        for name, source in sources.items()
-        if source.quantity.kept
-    ]
+    return names_of({name: source for name, source in sources.items() if source.quantity.kept})
+
+
+def names_of(sources: Mapping[str, Source]) -> tuple[str, ...]:
+    """Names, without the numbers of surfaces or parts, that keep all columns of `sources`."""
+    kept = [name if source.place is None else name.rpartition("_")[0] for name, source in sources.items()]
     return tuple(dict.fromkeys(kept))
 
 

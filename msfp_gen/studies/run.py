@@ -11,7 +11,7 @@ import json
 import os
 import re
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -106,14 +106,22 @@ def study(
 
 
 def run_on(
-    pool: Pool, study: Study, folder: Path, shard: tuple[int, int] = (1, 1), progress: Progress | None = None
+    pool: Pool,
+    study: Study,
+    folder: Path,
+    shard: tuple[int, int] = (1, 1),
+    progress: Progress | None = None,
+    without: Collection[int] = (),
 ) -> Outcome:
-    """Run the missing chunks of a study on a pool. Arguments, result and errors: as of `study`."""
+    """Run the missing chunks of a study on a pool. Arguments, result and errors: as of `study`.
+
+    without: numbers of chunks, from 0, that are not run, and not part of the result.
+    """
     make_folder(folder, "output")
     chunks = Chunks(study, folder)
     chunks.open()
     study, present = chunks.study, set(parts_in(chunks.folder))
-    numbers = range(shard[0] - 1, study.chunks, shard[1])
+    numbers = [number for number in range(shard[0] - 1, study.chunks, shard[1]) if number not in without]
     total, missing, before, failed = 0, [], 0, 0
     for task in map(study.task, numbers):
         total += len(task)

@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 
 import pytest
 from support.synthetic import loops, ramp
@@ -349,6 +350,17 @@ def test_terminal_gets_rich_tables_and_progress(capsys, monkeypatch, simulated):
     out, err = capsys.readouterr()
     assert "─" in out and "fenz-test5" in out
     assert err.count("50 %") == 1 and "100 %" in err and err.endswith("\r\x1b[K")
+
+
+def test_progress_never_falls_and_is_lines_where_there_is_no_terminal(capsys, monkeypatch):
+    monkeypatch.setattr("msfp_gen.cli.console.EVERY", 0.02)
+    with Progress("33 runs") as update:
+        time.sleep(0.06)  # nothing is known yet
+        update(20, 40)
+        update(10, 40)
+        time.sleep(0.1)
+    lines = capsys.readouterr().err.splitlines()
+    assert 1 < len(lines) < 10 and set(lines) == {"33 runs: 50 %"}
 
 
 def test_real_run_from_scene_to_files(capsys, tmp_path):

@@ -36,6 +36,7 @@ from msfp_gen.results.quantities import Source, quantities
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.fidelity import check_stack
 from msfp_gen.scene.friction_parameters import proportional
+from msfp_gen.scene.scene import Scene
 from msfp_gen.specification.friction_laws import Law
 from msfp_gen.studies.batch import ENDED, completed_runs
 from msfp_gen.studies.bounding.factors import PROPERTIES, RULES, SHEET, FactorTable, load_factors
@@ -232,6 +233,11 @@ def bounded_scenes(scene: System, table: FactorTable) -> dict[str, System]:
     return {case: bounded.beginning_like(list(scenes.values())) for case, bounded in scenes.items()}
 
 
+def scene_of_case(scene: System, table: FactorTable, case: str) -> System:
+    """The scene of one case as in `bounded_scenes`; the cases of one bearing need not be compared for it."""
+    return bounded_scene(scene, table, case) if isinstance(scene, Scene) else bounded_scenes(scene, table)[case]
+
+
 def bounded_scene(scene: System, table: FactorTable, case: str) -> System:
     """The scene of one case of CASES. Raises InputError as `bound`."""
     check_stack(scene)
@@ -295,7 +301,7 @@ def _scaled(bearing: Bearing, field: str, factors: tuple[float, ...]) -> Bearing
 def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[float, ...]]]:
     """Property -> case -> factor of every surface [-]; 1 for a surface without a factor. Raises InputError."""
     count = bearing.layout.surfaces
-    if table is SHEET:
+    if table == SHEET:  # equal, not the same: a worker process has a copy
         return {"friction": dict(zip(CASES, _sheet_ratios(bearing), strict=True))}
     pairs: dict[str, dict[int, tuple[float, float]]] = {}
     for index, factor in enumerate(table.factors):

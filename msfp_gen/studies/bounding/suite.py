@@ -1,61 +1,72 @@
 """Bounds under a suite of ground motions: means, worst values and envelopes over the records.
 
-A scene for each record comes in; `bound` runs each; statistics go out, as tables, CSV and a figure.
+A scene and a suite become a study with the axes `record` and `bounds`, so that the rows are kept as the runs end, and
+the same call continues; statistics go out, as tables, CSV and a figure.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.errors import RunError
+from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.figures.style import INK, distinct, headline, page, plain
-from msfp_gen.results.quantities import Source, quantities
-from msfp_gen.studies.bounding.factors import FactorTable
-from msfp_gen.studies.bounding.runs import CASES, Progress, bound, shown_as
+from msfp_gen.results.quantities import MOVING, Source
+from msfp_gen.scene.file.catalogue import suggestion
+from msfp_gen.studies.batch import ENDED, pool_from
+from msfp_gen.studies.bounding.runs import CASES, shown_as
+from msfp_gen.studies.columns import names_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.scene.system import System
+    from msfp_gen.studies.definition import Study
+
+Run = tuple[str, str]  # names of a record and of a case
 
 # Quantities of the figure, where the runs have them.
 DRAWN = ("peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "capacity_left")
-WORST: dict[str, Callable[..., Any]] = {"most": np.max, "least": np.min}
+WORST: dict[str, Callable[..., Any]] = {"most": np.nanmax, "least": np.nanmin}
+OF_RUN = ("duration", "verdict", "verdict_text")  # kept beside the quantities of which a value governs
+NO_VALUE = "some runs that reached their end have no such value"
 
 
 @dataclass(frozen=True)
 class Statistic:
     """Statistics of a quantity over the records of a suite.
 
-    name: column of `catalogue`. part: name of its bearing, storey, floor or surface; "" for the bearing or building as
-    a whole. extreme: whether the largest or the least value is the worst. means, worst: by case [SI]. governs: case
-    with the worst mean. record: record with the worst value of all.
+    name: column of the study. part: name of its bearing, storey, floor or surface; "" for the bearing or building as a
+    whole. extreme: whether the largest or the least value is the worst. means: by case, over the runs that ended [SI];
+    None where a run that ended has no value. worst: by case, of all runs, also of those that ended early [SI]. governs:
+    case with the worst mean; "" unless all means are of the same records. record: record with the worst value of all.
     """
 
     name: str
     part: str
     unit: str
     extreme: Literal["most", "least", ""]
-    means: tuple[float, ...]
-    worst: tuple[float, ...]
+    means: tuple[float | None, ...]
+    worst: tuple[float | None, ...]
     governs: str
     record: str
 
     @property
-    def envelope(self) -> tuple[float, float]:
-        """The worst mean and the worst value over the cases [SI]."""
+    def envelope(self) -> tuple[float | None, float]:
+        """The worst mean, None unless all means are of the same records, and the worst value over the cases [SI]."""
         worst_of = WORST[self.extreme]
-        return float(worst_of(self.means)), float(worst_of(self.worst))
+        mean = float(worst_of([m for m in self.means if m is not None])) if self.governs else None
+        return mean, float(worst_of([value for value in self.worst if value is not None]))
 
 
 @dataclass(frozen=True)
@@ -64,119 +75,199 @@ class SuiteBounds:
 
     Attributes:
         name: of the scene, for the figure.
-        table: of factors.
+        factors: name of the table of factors.
         records: names of the motions.
+        left_out: names of the motions of the suite that were not asked for.
         sources: column -> quantity, with the name of its bearing, storey, floor or surface.
-        values: column -> values, shape (records, cases) [SI]; NaN where a run has none.
+        values: column -> values, shape (records, cases) [SI]; NaN where a run has none. Of a run that ended early the
+            value until then, where more of the run can only make it worse.
         failures: (record, case) -> message of a run that failed.
-        undefined: column -> why runs that reached their end have no value.
         exceeded: (record, case) -> verdict of a run that exceeded limits of the device.
         stopped: (record, case) -> time at which a run met the stop condition of the scene [s].
     """
 
     name: str
-    table: FactorTable
+    factors: str
     records: tuple[str, ...]
+    left_out: tuple[str, ...]
     sources: Mapping[str, Source]
     values: Mapping[str, Array]
-    failures: Mapping[tuple[str, str], str]
-    undefined: Mapping[str, str]
-    exceeded: Mapping[tuple[str, str], str]
-    stopped: Mapping[tuple[str, str], float]
+    failures: Mapping[Run, str]
+    exceeded: Mapping[Run, str]
+    stopped: Mapping[Run, float]
+
+    @cached_property
+    def ended(self) -> Any:
+        """Whether each run reached its end, ndarray of bool, shape (records, cases)."""
+        early = {*self.failures, *self.stopped}
+        return np.array([[(record, case) not in early for case in CASES] for record in self.records])
 
     @cached_property
     def statistics(self) -> tuple[Statistic, ...]:
-        """The statistics of every quantity with a mean, as of `has_mean`."""
-        return tuple(self._statistic(name, values) for name, values in self.values.items() if self.has_mean(name))
+        """The statistics of every quantity with a value."""
+        known = {name: values for name, values in self.values.items() if not np.isnan(values).all()}
+        return tuple(self._statistic(name, values) for name, values in known.items())
 
-    def has_mean(self, name: str) -> bool:
-        """Whether a column has a mean: a value of it governs, every run has one, and no run met the stop condition."""
-        known = not self.stopped and not np.isnan(self.values[name]).any()
-        return bool(self.sources[name].quantity.governs) and known
+    def means(self, name: str) -> tuple[float | None, ...]:
+        """The mean of a column by case, over the runs that ended [SI]; None where one of these has no value."""
+        columns = (values[ended] for values, ended in zip(self.values[name].T, self.ended.T, strict=True))
+        return tuple(float(c.mean()) if c.size and not np.isnan(c).any() else None for c in columns)
 
     def _statistic(self, name: str, values: Array) -> Statistic:
         quantity, _, part = self.sources[name]
         worst_of = WORST[quantity.governs]
-        means, worst = values.mean(axis=0), worst_of(values, axis=0)
-        case = CASES[int(np.flatnonzero(means == worst_of(means))[0])]
+        means = self.means(name)
+        worst = [None if np.isnan(column).all() else float(worst_of(column)) for column in values.T]
+        same = all((column == self.ended[:, 0]).all() for column in self.ended.T)
+        case = CASES[means.index(worst_of(means))] if same and None not in means else ""
         record = self.records[int(np.argwhere(values == worst_of(values))[0][0])]
-        numbers = tuple(means.tolist()), tuple(worst.tolist())
-        return Statistic(name, part, quantity.unit, quantity.governs, *numbers, case, record)
+        return Statistic(name, part, quantity.unit, quantity.governs, means, tuple(worst), case, record)
 
     @property
-    def left_out(self) -> dict[str, str]:
-        """Column -> why it has no mean, for the columns of which a value governs."""
-        runs, reasons = len(self.records) * len(CASES), dict(self.undefined)
-        for incomplete, what in ((self.stopped, "met the stop condition of the scene"), (self.failures, "failed")):
-            if incomplete:
-                reason = f"{len(incomplete)} of {runs} runs {what}, so that a mean would be biased"
-                reasons |= {name: reason for name, source in self.sources.items() if source.quantity.governs}
+    def undefined(self) -> dict[str, str]:
+        """Column -> why it has no mean, for those of which some runs that reached their end have no value.
+
+        A column without any value is of something that the runs do not model, such as uplift.
+        """
+        reasons = {}
+        for name, values in self.values.items():
+            missing, at_rest = np.isnan(values[self.ended]), self.sources[name].quantity.at_rest
+            if missing.any() and (at_rest or not np.isnan(values).all()):
+                reasons[name] = MOVING if at_rest else NO_VALUE
         return reasons
+
+    @property
+    def incomplete(self) -> dict[str, str]:
+        """Case -> of what its means are, where a run did not reach its end."""
+        texts = {}
+        for case, ended in zip(CASES, self.ended.T, strict=True):
+            early = [record for record, whole in zip(self.records, ended, strict=True) if not whole]
+            if early:
+                texts[case] = f"of the {int(ended.sum())} that ended, {', '.join(early)} left out"
+        return texts
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON."""
         return {
-            "factors": self.table.name,
+            "factors": self.factors,
             "records": list(self.records),
+            "left_out": list(self.left_out),
             "statistics": [vars(statistic) | {"envelope": statistic.envelope} for statistic in self.statistics],
-            "left_out": self.left_out,
+            "means": self.incomplete,
+            "undefined": self.undefined,
             "exceeded": [{"record": r, "case": c, "verdict": text} for (r, c), text in self.exceeded.items()],
             "stopped": [{"record": r, "case": c, "time": time} for (r, c), time in self.stopped.items()],
             "failures": [{"record": r, "case": c, "message": text} for (r, c), text in self.failures.items()],
         }
 
 
+def suite_study(
+    scene: str | Path | Mapping[str, Any],
+    suite: str | Path,
+    factors: str | Path,
+    progress: Callable[[float, float], None] | None = None,
+) -> Study:
+    """The study of `bound_suite`: one run for each record, slowest, and each bound. Arguments: as of `bound_suite`.
+
+    progress: of the scaling of the suite. Raises InputError.
+    """
+    from msfp_gen.studies.definition import load_study  # which imports this package
+
+    table = {
+        "name": "" if isinstance(scene, Mapping) else Path(scene).stem,
+        "scene": scene if isinstance(scene, Mapping) else str(scene),
+        "records": {"suite": str(suite)},
+        "axes": {"bounds": {"factors": str(factors)}},
+        "chunk": 1,  # a run that has ended is not lost
+    }
+    study = load_study(table, progress)
+    governing = {name: source for name, source in study.keep.sources if source.quantity.governs}
+    names = (*names_of(governing), *OF_RUN)
+    return replace(study, keep=replace(study.keep, names=names), table={**study.table, "keep": list(names)})
+
+
 def bound_suite(
-    scenes: Mapping[str, System], table: FactorTable, *, name: str = "", progress: Progress | None = None
+    study: Study,
+    output: str | Path | None = None,
+    *,
+    leave_out: Collection[str] = (),
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> SuiteBounds:
     """Run the cases of `bound` under each motion of a suite, and keep the quantities of the runs.
 
-    A run that fails is part of the result. Raises InputError as `bound`; RunError: no run reached its end.
+    Every run takes in the effects that it needs. The same call continues one that was interrupted. A run that fails is
+    part of the result.
 
-    scenes: name of the record -> the scene with this motion. name: of the scene, for the figure. progress: as of
-    `bound`.
+    Args:
+        study: of scene, suite and factors, by `suite_study`.
+        output: folder of the rows, as of `study`; None: they are not kept.
+        leave_out: names of records that are neither run nor part of the result.
+        workers: runs at the same time; None: one for each core.
+        progress: called with the number of runs done, by earlier calls too, and of all.
+
+    Raises InputError: as of `study`, or an unknown record; RunError: no run reached its end.
     """
-    first = next(iter(scenes.values()))
-    sources = {name: source for name, source in quantities(first).items() if source.quantity.governs}
-    values = {key: np.full((len(scenes), len(CASES)), np.nan) for key in sources}
-    failures: dict[tuple[str, str], str] = {}
-    undefined: dict[str, str] = {}
-    exceeded: dict[tuple[str, str], str] = {}
-    stopped: dict[tuple[str, str], float] = {}
-    for row, (record, scene) in enumerate(scenes.items()):
-        own_progress = None if progress is None else _progress_of(progress, row, len(scenes))
-        try:
-            cases = bound(scene, table, progress=own_progress).cases
-        except RunError as error:
-            failures |= {(record, case): str(error) for case in CASES}
-            continue
-        for column, case in enumerate(cases):
-            if case.result is not None and case.result.verdict.exceeded:
-                exceeded[record, case.name] = case.result.verdict.text
-            if case.stopped_at is not None:
-                stopped[record, case.name] = case.stopped_at
-            if case.result is None or case.characterisation is None:
-                failures[record, case.name] = case.failure
-                continue
-            for key, source in sources.items():
-                if (value := case.value(source)) is not None:
-                    values[key][row, column] = value
-                elif reason := source.reason(case.characterisation):
-                    undefined[key] = reason
-    if len(failures) == len(scenes) * len(CASES):
+    from msfp_gen.studies.run import run_on
+
+    check_left_out(leave_out, study)
+    names = list(study.inputs.records)
+    without = [len(CASES) * names.index(name) + case for name in leave_out for case in range(len(CASES))]
+    with TemporaryDirectory() as temporary, pool_from(workers, threads=True) as pool:
+        folder = Path(temporary if output is None else output)
+        run_on(pool, study, folder, progress=progress, without=without)
+        return _from_rows(study, folder, leave_out)
+
+
+def check_left_out(leave_out: Collection[str], study: Study) -> None:
+    """Raise InputError where a record is unknown, or none is left."""
+    names = list(study.inputs.records)
+    for name in leave_out:
+        if name not in names:
+            hint = suggestion(name, names) or f"; the records are {', '.join(names)}"
+            raise InputError(f"--leave-out = {name!r}: no record of the suite{hint}")
+    if len(set(leave_out)) == len(names):
+        raise InputError("--leave-out: no record of the suite is left; leave fewer out")
+
+
+def _from_rows(study: Study, folder: Path, leave_out: Collection[str]) -> SuiteBounds:
+    """The result of the rows in the folder of a study. Raises RunError where no run reached its end."""
+    from msfp_gen.studies.assessment.rows import read_study
+
+    rows = read_study(folder)
+    rows = rows[~rows["record"].isin(list(leave_out))]
+    runs: list[Run] = list(zip(rows["record"], rows["bounds"], strict=True))
+    early = rows["status"].to_numpy() != "ok"
+    sources = {name: source for name, source in study.keep.sources if name in rows and source.quantity.governs}
+    values = {}
+    for name, source in sources.items():
+        column = rows[name].to_numpy(dtype=float, na_value=np.nan)
+        until_then = source.quantity.side == source.quantity.governs  # more of the run can only make it worse
+        values[name] = (column if until_then else np.where(early, np.nan, column)).reshape(-1, len(CASES))
+
+    def chosen(column: str, which: Iterable[bool]) -> dict[Run, Any]:
+        return {run: value for run, value, is_one in zip(runs, rows[column], which, strict=True) if is_one}
+
+    failures = chosen("message", ~rows["status"].isin(ENDED))
+    if len(failures) == len(runs):
         raise RunError(
             f"no run of the suite reached its end; the first: {next(iter(failures.values()))}", status="bound"
         )
-    return SuiteBounds(name, table, tuple(scenes), sources, values, failures, undefined, exceeded, stopped)
-
-
-def _progress_of(progress: Progress, row: int, count: int) -> Progress:
-    """The progress of one record, by its index, as progress of a suite of `count` records."""
-    return lambda done, whole: progress(row + done / whole, count)
+    return SuiteBounds(
+        name=study.name,
+        factors=study.inputs.factors[study.axes[-1].paths[0]].name,
+        records=tuple(dict.fromkeys(record for record, _ in runs)),
+        left_out=tuple(leave_out),
+        sources=sources,
+        values=values,
+        failures=failures,
+        exceeded=chosen("verdict_text", rows["verdict"] == "exceeded"),
+        stopped=chosen("duration", rows["status"] == "stopped"),
+    )
 
 
 def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
-    """Tables of statistics, of quantities without a mean, and of runs that exceeded limits, were stopped, or failed.
+    """Tables of statistics, and of what is missing in them: one line for each reason.
 
     The statistics are of the bearing or building as a whole; `write_statistics` writes those of its parts too.
     """
@@ -184,22 +275,71 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
     for statistic in bounds.statistics:
         if not statistic.part:
             unit, scale = shown_as(statistic.unit)
-            numbers = [f"{value * scale:.4g}" for value in (*statistic.means, *statistic.worst)]
+            numbers = (*statistic.means, *statistic.worst)
+            cells = ["-" if value is None else f"{value * scale:.4g}" for value in numbers]
             name = f"{bounds.sources[statistic.name].words(statistic.name)} [{unit}]"
-            rows.append((name, *numbers, statistic.governs, statistic.record))
-    columns = ("", *(f"mean {case}" for case in CASES), *(f"worst {case}" for case in CASES), "governs", "worst record")
-    reasons = [(bounds.sources[name].words(name), why) for name, why in bounds.left_out.items()]
+            rows.append((name, *cells, statistic.governs or "-", statistic.record))
+    marks = {case: "*" if case in bounds.incomplete else "" for case in CASES}
+    columns = (
+        "",
+        *(f"mean {case}{marks[case]}" for case in CASES),
+        *(f"worst {case}{marks[case]}" for case in CASES),
+        "governs",
+        "worst record",
+    )
+    means = [(f"* mean {', '.join(cases)}", text) for text, cases in _grouped(bounds.incomplete, str).items()]
+    if means:
+        means.append(("* worst", "with the values until then of runs that ended early"))
+    if bounds.left_out:
+        means.append(("left out", ", ".join(bounds.left_out)))
     exceeded = [(f"{record}, {case}", verdict) for (record, case), verdict in bounds.exceeded.items()]
+    undefined = [(", ".join(dict.fromkeys(names)), reason) for reason, names in _reasons(bounds).items()]
     stopped = [(f"{record}, {case}", f"{time:.4g} s") for (record, case), time in bounds.stopped.items()]
-    failed = [(f"{record}, {case}", message) for (record, case), message in bounds.failures.items()]
+    failed = [(_named(runs), bounds.failures[runs[0]]) for runs in _grouped(bounds.failures, _words).values()]
     tables = [
-        Table(f"{len(bounds.records)} records at bounds by {bounds.table.name}: means and worst values", columns, rows),
-        Table("what has no mean, and why", (), reasons),
+        Table(f"{_counted(bounds)} at bounds by {bounds.factors}: means and worst values", columns, rows),
+        Table("of which records the numbers are", (), means),
+        Table("what has no mean, and why", (), undefined),
         Table("limits of the device that runs exceeded (docs/limits.md)", (), exceeded),
         Table("runs that met the stop condition of the scene", (), stopped),
-        Table("runs that failed", (), failed),
+        Table("runs that failed; of several for the same reason the first message", (), failed),
     ]
     return [table for table in tables if table.rows]
+
+
+def _counted(bounds: SuiteBounds) -> str:
+    count = len(bounds.records)
+    return f"{count} record{'s' * (count > 1)}"
+
+
+def _reasons(bounds: SuiteBounds) -> dict[str, list[str]]:
+    """Reason -> words of the quantities without a mean, each once for all parts."""
+    reasons: dict[str, list[str]] = {}
+    for name, why in bounds.undefined.items():
+        source = bounds.sources[name]
+        reasons.setdefault(why, []).append(source.words(name).removesuffix(f" of {source.part}"))
+    return reasons
+
+
+def _grouped(values: Mapping[Any, Any], reason: Callable[[Any], str]) -> dict[str, list[Any]]:
+    """Reason of a value -> the keys that have it."""
+    groups: dict[str, list[Any]] = {}
+    for key, value in values.items():
+        groups.setdefault(reason(value), []).append(key)
+    return groups
+
+
+def _words(message: str) -> str:
+    """A message without its numbers."""
+    return re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "", message)
+
+
+def _named(runs: Iterable[Run]) -> str:
+    """Runs by the names of their records, each with its cases."""
+    cases: dict[str, list[str]] = {}
+    for record, case in runs:
+        cases.setdefault(record, []).append(case)
+    return "; ".join(f"{record}: {', '.join(of_record)}" for record, of_record in cases.items())
 
 
 def write_statistics(bounds: SuiteBounds, path: str | Path) -> Path:
@@ -207,12 +347,13 @@ def write_statistics(bounds: SuiteBounds, path: str | Path) -> Path:
 
     Raises InputError for a path that does not end in .csv or cannot be written.
     """
-    rows = bounds.statistics
+    rows, counts = bounds.statistics, bounds.ended.sum(axis=0).tolist()
     columns: dict[tuple[str, str], list[Any]] = {
         ("quantity", ""): [bounds.sources[row.name].words(row.name) for row in rows],
         ("of", ""): [row.part for row in rows],
         ("unit", ""): [row.unit or "1" for row in rows],
         **{(f"mean {case}", ""): [row.means[i] for row in rows] for i, case in enumerate(CASES)},
+        **{(f"records in mean {case}", ""): [counts[i]] * len(rows) for i, case in enumerate(CASES)},
         **{(f"worst {case}", ""): [row.worst[i] for row in rows] for i, case in enumerate(CASES)},
         ("envelope of means", ""): [row.envelope[0] for row in rows],
         ("envelope of worst", ""): [row.envelope[1] for row in rows],
@@ -245,14 +386,12 @@ def write_records(bounds: SuiteBounds, path: str | Path) -> Path:
 def plot_suite_bounds(bounds: SuiteBounds, path: str | Path | None = None) -> Figure:
     """The quantities DRAWN over the cases: each record in a colour of its own, and the means over the records.
 
-    Runs without a value are not drawn. Raises InputError for a path that cannot be written.
+    A cross marks a run that did not reach its end. Raises InputError for a path that cannot be written.
     """
     plotted = [name for name in DRAWN if name in bounds.values and not np.isnan(bounds.values[name]).all()]
     colours = distinct(len(bounds.records))
     with page(3.4 * len(plotted) + 2.2, 4.4, path, "suite") as figure:
-        headline(
-            figure, f"{bounds.name or 'unnamed scene'}: {len(bounds.records)} records at bounds by {bounds.table.name}"
-        )
+        headline(figure, f"{bounds.name or 'unnamed scene'}: {_counted(bounds)} at bounds by {bounds.factors}")
         row = figure.subplots(1, len(plotted), squeeze=False)[0]
         for axes, name in zip(row, plotted, strict=True):
             _draw(axes, bounds, name, colours)
@@ -266,7 +405,11 @@ def _draw(axes: Axes, bounds: SuiteBounds, name: str, colours: Sequence[str]) ->
     values = bounds.values[name] * scale
     for record, of_record, colour in zip(bounds.records, values, colours, strict=True):
         axes.plot(CASES, of_record, color=colour, marker="o", markersize=4, label=plain(record))
-    if bounds.has_mean(name):
-        axes.plot(CASES, values.mean(axis=0), color=INK, linewidth=2.5, label="mean")
+    for number, (row, case) in enumerate(np.argwhere(~bounds.ended & ~np.isnan(values))):
+        style: dict[str, Any] = {"color": colours[row], "marker": "x", "markersize": 10, "linestyle": "none"}
+        axes.plot(CASES[case], values[row, case], **style, label="until a run ended early" if number == 0 else None)
+    means = [np.nan if mean is None else mean * scale for mean in bounds.means(name)]
+    label = "mean of the runs that ended" if bounds.incomplete else "mean"
+    axes.plot(CASES, means, color=INK, linewidth=2.5, marker="_", markersize=16, label=label)
     axes.set(title=bounds.sources[name].words(name), ylabel=f"[{unit}]")
     axes.set_ylim(bottom=min(0.0, float(np.nanmin(values))))
