@@ -15,7 +15,7 @@ from msfp_gen.buildings.storey import BaseSlab, Soil, Storey
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, errors_at
 from msfp_gen.common.identity import fingerprint
-from msfp_gen.common.inputs import Storage, digest_of, expecting
+from msfp_gen.common.inputs import InputCache, digest_of, expecting
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.fidelity import at_fidelity
@@ -88,7 +88,7 @@ SCENE = model_of(
     solver=(PARTS["solver"], None),
     limits=(PARTS["limits"], None),
 )
-_buildings: Storage[Building] = Storage(256 << 20, lambda building: 3 * building.mass.nbytes)
+_buildings: InputCache[Building] = InputCache(256 << 20, lambda building: 3 * building.mass.nbytes)
 MATRICES = paths_in(FrameTable)
 
 

@@ -2,7 +2,7 @@
 
 Records, matrices and tables of factors are read by `read_input`. Inside `recording()` it notes the sha256 of every file
 that is read; inside `expecting(files)` it refuses a file that is not as it was noted. What is made of a file is kept in
-`Storage` by the sha256 of its bytes, never by its name or its time.
+`InputCache` by the sha256 of its bytes, never by its name or its time.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def _changed(path: Path, why: str) -> ChangedFileError:
     return ChangedFileError(f"{path}: not as it was when it was first read ({why}); run the same command again")
 
 
-class Storage(Generic[T]):
+class InputCache(Generic[T]):
     """The values that were made last, by their keys, of at most so much size in all; for threads too."""
 
     def __init__(self, most: int, size: Callable[[T], int]) -> None:

@@ -120,6 +120,8 @@ class StoredGroup:
         value = value.item() if isinstance(value, np.ndarray | np.generic) else value
         if not isinstance(value, str | int | float):
             raise ValueError(f"attribute {name} is no text and no number")
+        if isinstance(value, str):
+            value.encode()  # h5py passes on bytes that are no text; UnicodeEncodeError is a ValueError
         return value
 
 

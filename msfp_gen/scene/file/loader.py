@@ -17,7 +17,7 @@ import numpy as np
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import errors_at, ruled_fields
 from msfp_gen.common.identity import fingerprint
-from msfp_gen.common.inputs import Storage, is_input, read_input
+from msfp_gen.common.inputs import InputCache, is_input, read_input
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.fidelity import at_fidelity
@@ -48,7 +48,7 @@ MAX_DEPTH = 16  # of nested tables and lists; a scene has six
 _TOO_DEEP = "no valid TOML: tables or lists are nested too deeply; a scene needs few levels"
 _TOPS = {kind.kind: kind for kind in (RigTop, PrescribedTop, MassTop)}
 _ANY_MOTION: Table = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # valid, where a motion replaces it
-_complete: Storage[Table] = Storage(16, lambda _: 1)
+_complete: InputCache[Table] = InputCache(16, lambda _: 1)
 _FIELDS_ALONE = {"solver": Solver, "initial_state": InitialState, "stop": Stop, "limits": Limits}
 
 

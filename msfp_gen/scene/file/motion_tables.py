@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Notes, Quantity, Text, ruled_fields
 from msfp_gen.common.identity import fingerprint
-from msfp_gen.common.inputs import Storage, digest_of, expecting, is_input
+from msfp_gen.common.inputs import InputCache, digest_of, expecting, is_input
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load, Prescribed, Rotation
 
@@ -375,8 +375,8 @@ def _digests(paths: Sequence[Path]) -> dict[str, str]:
         ) from None
 
 
-_motions: Storage[Motion] = Storage(MOST_BYTES, lambda motion: motion.coefficients.nbytes)
-_records: Storage[Record] = Storage(MOST_BYTES, lambda record: record.acceleration.nbytes)
+_motions: InputCache[Motion] = InputCache(MOST_BYTES, lambda motion: motion.coefficients.nbytes)
+_records: InputCache[Record] = InputCache(MOST_BYTES, lambda record: record.acceleration.nbytes)
 
 
 def resolved(file: str | tuple[str, ...], folder: Path | None, name: str = "motion.file") -> str | tuple[str, ...]:
