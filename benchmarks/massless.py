@@ -37,9 +37,8 @@ LIMIT = 10.0  # [s] of wall time of one run with given sliders
 
 def response_ratio(scene: Scene) -> float:
     """Response time of the sliders over error times the time scale of the motion [-]."""
-    times = np.union1d(scene.motion.knots, np.linspace(0.0, scene.end, 1001))
     response = response_time(scene.bearing, scene.top, minimum_load(scene))
-    return response / (auto.PROMISED * motion_time_scale(scene.motion, times))
+    return response / (auto.PROMISED * motion_time_scale(scene))
 
 
 def massless(scene: Scene) -> Scene | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ def parts(values: Any, shapes: Iterable[tuple[str, tuple[int, ...]]]) -> dict[st
     """Parts of the last axis of an array by name, each of shape (..., *its own). shapes: names and shapes, in order."""
     columns, begin = {}, 0
     for name, shape in shapes:
-        end = begin + int(np.prod(shape, dtype=int))
+        end = begin + prod(shape)
         columns[name] = values[..., begin:end].reshape(values.shape[:-1] + shape)
         begin = end
     return columns

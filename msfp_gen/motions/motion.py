@@ -92,7 +92,7 @@ class Motion:
         """Duration [s]; a motion starts at time zero."""
         return float(self.knots[-1])
 
-    @property
+    @cached_property
     def sampled(self) -> bool:
         """Whether the knots are samples, at which the third derivative jumps.
 
@@ -106,6 +106,13 @@ class Motion:
         if self.sampled:
             return Resolution.sampled(self.knots)
         return Resolution.of(self, orders=(0, 1, 2), longest=self.max_step)
+
+    @cached_property
+    def start(self) -> Array:
+        """All six channels at time zero: ndarray, shape (6,), [m] and [rad]."""
+        values = self.evaluate(0.0)
+        values.setflags(write=False)
+        return values
 
     def evaluate(self, t: ArrayLike, derivative: int = 0) -> Array:
         """All six channels or a time derivative of them: ndarray, shape (..., 6), [m] and [rad], per s**derivative.

@@ -18,6 +18,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
+from msfp_gen.common.later import Later
 from msfp_gen.common.tables import Table
 from msfp_gen.results import dataset, files
 from msfp_gen.results.characterise import Characterisation
@@ -237,7 +238,8 @@ OVER_STEPS = {
 class Result(AnyResult):
     """The result of `simulate`, or one bearing of the result of a building.
 
-    A RunError has one in `.result` if the run failed after its start.
+    A RunError has one in `.result` if the run failed after its start. History and notes are made of the recorded rows
+    when they are asked for first.
 
     history: rows; below a building those of `BearingRows` alone, with the displacement across bearing and interface,
     base_displacement of the ground below it, and top_moment about its upper end. events: located by the run; none below
@@ -252,13 +254,13 @@ class Result(AnyResult):
     source: ClassVar[str] = "msfp-gen"
     storage: ClassVar[Storage] = dataset.STORAGE
     scene: Scene
-    history: History
+    history: Later[History] = Later()
     events: tuple[Event, ...] = ()
     counters: Counters = field(default_factory=Counters)
     status: str = "ok"
     message: str = ""
     provenance: dict[str, str] = field(default_factory=dict)
-    notes: tuple[Note, ...] = ()
+    notes: Later[tuple[Note, ...]] = Later(())
     recorded_extremes: Extremes | None = None
     gradients: Gradients | None = None
     mounting: Mounting | None = None

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.later import kept
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.standing import standing_of, unsteady
 from msfp_gen.scene.top import MassTop, RigTop, Top, load_values, sprung_mass
@@ -19,6 +20,7 @@ from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
+    from msfp_gen.motions.prescribed import Load
     from msfp_gen.scene.bearing import Bearing
     from msfp_gen.scene.scene_fields import SceneFields
 
@@ -38,10 +40,37 @@ def response_time(bearing: Bearing, top: Top, load: float) -> float:
     return float(np.sqrt(longest))
 
 
-def motion_time_scale(motion: Motion, times: Array) -> float:
-    """Peak velocity of the base over its peak acceleration [s], of `times` [s]; inf where it is at rest."""
-    velocity, acceleration = (np.linalg.norm(motion.evaluate(times, order)[:, :3], axis=1).max() for order in (1, 2))
-    return float(velocity / acceleration) if acceleration > 0 else inf
+class Samples(NamedTuple):
+    """The base motion of a scene at its knots, those of the load, and 1001 even times until the end of the run.
+
+    times: shape (k,) [s]. displacement [m], acceleration [m/s^2]: shape (k, 3). peak_speed [m/s], peak_acceleration
+    [m/s^2]: largest magnitudes.
+    """
+
+    times: Array
+    displacement: Array
+    acceleration: Array
+    peak_speed: float
+    peak_acceleration: float
+
+
+def samples_of(scene: SceneFields) -> Samples:
+    """The samples of a scene, which are taken once for a motion."""
+    return kept(scene.motion, _sampled, scene.end, scene.load)
+
+
+def _sampled(motion: Motion, end: float, load: Load | None) -> Samples:
+    times = np.concatenate([motion.knots, () if load is None else load.knots, np.linspace(0, end, 1001)])
+    times = np.unique(times[times <= end])
+    displacement, velocity, acceleration = (motion.evaluate(times, order)[:, :3] for order in range(3))
+    peaks = (float(np.linalg.norm(values, axis=1).max()) for values in (velocity, acceleration))
+    return Samples(times, displacement, acceleration, *peaks)
+
+
+def motion_time_scale(scene: SceneFields) -> float:
+    """Peak velocity of the base over its peak acceleration [s]; inf where it is at rest."""
+    motion = samples_of(scene)
+    return motion.peak_speed / motion.peak_acceleration if motion.peak_acceleration > 0 else inf
 
 
 def turned_or_pushed(scene: SceneFields) -> bool:
@@ -226,7 +255,7 @@ def _rims(scene: SceneFields, requested: Auto) -> Reason:
 
 def _farthest(scene: SceneFields) -> float:
     """Largest horizontal distance of the base from its position at the start [m]."""
-    path = scene.motion.evaluate(_sampled_times(scene))[:, :2]
+    path = samples_of(scene).displacement[:, :2]
     return float(np.linalg.norm(path - path[0], axis=1).max())
 
 
@@ -249,7 +278,7 @@ def _sliders(scene: SceneFields, requested: Auto, others: Effects, plane_until: 
     if share > limit:
         because = f"inertial forces of the sliders are {share:.2g} of N; the permitted share is {limit:.2g}"
         return Reason("sliders", "inertial", because)
-    time_scale = motion_time_scale(scene.motion, _sampled_times(scene))
+    time_scale = motion_time_scale(scene)
     response = response_time(scene.bearing, scene.top, minimum_load(scene))
     longest = RESPONSE_SHARE * requested.error * time_scale
     because = f"sliding bodies respond within {response:.2g} s; for this motion {longest:.2g} s is permitted"
@@ -320,19 +349,17 @@ def rigid_mass_limit(scene: SceneFields) -> float:
 
 def _loads(scene: SceneFields) -> Array:
     """Vertical loads on the lowest surface if all masses follow the vertical motion of the base [N]."""
-    times = _sampled_times(scene)
-    vertical = scene.motion.evaluate(times, 2)[:, 2]
+    motion = samples_of(scene)
     bodies = sum(body.mass for body in scene.bearing.bodies)
-    inertial = (_supported_mass(scene) + bodies) * (scene.bearing.gravity + vertical)
-    return inertial + _applied_load(scene, times) + _held_load(scene, times)
+    inertial = (_supported_mass(scene) + bodies) * (scene.bearing.gravity + motion.acceleration[:, 2])
+    return inertial + _applied_load(scene, motion.times) + _held_load(scene, motion.displacement[:, 2])
 
 
-def _held_load(scene: SceneFields, times: Array) -> Array | float:
+def _held_load(scene: SceneFields, height: Array) -> Array | float:
     """Force of the vertical spring of a rig if the top plate rises and falls with the base, downward positive [N]."""
     if not isinstance(scene.top, RigTop):
         return 0.0
-    rise = scene.motion.evaluate(times)[:, 2] - scene.motion.evaluate(times[:1])[0, 2]
-    return np.asarray(scene.top.vertical_stiffness * rise)
+    return np.asarray(scene.top.vertical_stiffness * (height - height[0]))
 
 
 def _supported_mass(scene: SceneFields) -> float:
@@ -348,9 +375,8 @@ def _applied_load(scene: SceneFields, time: ArrayLike) -> Array:
 
 def inertia_share(scene: SceneFields) -> float:
     """Largest inertial force of a body over the load at rest, if the bodies follow the base [-]."""
-    peak = float(np.linalg.norm(scene.motion.evaluate(_sampled_times(scene), 2)[:, :3], axis=1).max())
-    rest = load_at_rest(scene)
-    return max(body.mass for body in scene.bearing.bodies) * peak / rest if rest > 0 else inf
+    heaviest, rest = max(body.mass for body in scene.bearing.bodies), load_at_rest(scene)
+    return heaviest * samples_of(scene).peak_acceleration / rest if rest > 0 else inf
 
 
 def quasistatic(scene: SceneFields, effects: Effects) -> bool:
@@ -381,7 +407,7 @@ def damping_share(scene: SceneFields) -> float:
     within d_y, the change of the friction moment over the rotational stiffness.
     """
     surfaces, top = scene.bearing.surfaces, scene.top
-    speed = float(np.linalg.norm(scene.motion.evaluate(_sampled_times(scene), 1)[:, :3], axis=1).max())
+    speed = samples_of(scene).peak_speed
     friction = min(surface.friction for surface in surfaces) * minimum_load(scene)
     if friction <= 0:
         return inf
@@ -406,10 +432,3 @@ def slider_period(scene: SceneFields) -> float:
         stiffness = surface.friction * rest / surface.yield_displacement + rest / surface.radius
         longest = max(longest, scene.bearing.bodies[index].mass / stiffness if stiffness > 0 else inf)
     return float(2 * np.pi * np.sqrt(longest))
-
-
-def _sampled_times(scene: SceneFields) -> Array:
-    """Times at which motion and load are evaluated: their knots, and 1001 evenly spaced ones."""
-    load_knots = () if scene.load is None else scene.load.knots
-    times = np.concatenate([scene.motion.knots, load_knots, np.linspace(0, scene.end, 1001)])
-    return np.unique(times[times <= scene.end])

@@ -8,14 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.later import kept
 from msfp_gen.motions import piecewise
+from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.piecewise import ORDER
+from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.scene.top import PrescribedTop
 
 if TYPE_CHECKING:
@@ -36,20 +40,22 @@ class PlaneInput:
     coefficients: Array
     euler_angles: bool = False
 
+    @cached_property
     def onset(self) -> float:
         """Time from which the input is not zero [s]; inf where it always is."""
         nonzero = np.any(self.coefficients, axis=(1, 2))
         return float(self.knots[int(np.argmax(nonzero))]) if nonzero.any() else inf
 
+    @cached_property
     def plane(self) -> tuple[float | None, float]:
         """Azimuth of the plane in which the input starts [rad], and the time at which it leaves that plane [s].
 
         The azimuth is None where the input is zero or axial; the time is inf where it stays.
         """
-        if self.onset() == inf:
+        if self.onset == inf:
             return None, inf
         if self.coefficients.shape[1] == 1:
-            return None, self.onset()
+            return None, self.onset
         azimuth_of_all = piecewise.azimuth(self.knots, self.coefficients)
         if azimuth_of_all is not None:
             return azimuth_of_all, inf
@@ -67,12 +73,12 @@ def scene_plane(scene: SceneFields) -> tuple[float, float, str]:
     scene_azimuth: float | None = None
     until, name = inf, "motion"
     for part in plane_inputs(scene):
-        azimuth, leaves = part.plane()
+        azimuth, leaves = part.plane
         if azimuth is not None and scene_azimuth is None:
             scene_azimuth = azimuth
         other_plane = azimuth is not None and scene_azimuth is not None and abs(azimuth - scene_azimuth) > 1e-9
         oblique = part.euler_angles and azimuth is not None and min(abs(azimuth), abs(azimuth - pi / 2)) > 1e-9
-        end = part.onset() if other_plane or oblique else leaves
+        end = part.onset if other_plane or oblique else leaves
         if end < until:
             until, name = end, part.name
     return scene_azimuth or 0.0, until, name
@@ -80,20 +86,15 @@ def scene_plane(scene: SceneFields) -> tuple[float, float, str]:
 
 def plane_inputs(scene: SceneFields) -> Iterator[PlaneInput]:
     """All inputs of a scene that may leave a vertical plane, the base motion first."""
-    motion = scene.motion
-    moving = motion.coefficients.copy()
-    moving[:, :, 0] -= moving[0, :, 0]
-    yield PlaneInput("motion", motion.knots, moving[:, :2])
-    yield _tilt("rotation of the base", motion.knots, motion.coefficients[:, 3:5])
-    yield PlaneInput("rotation of the base", motion.knots, motion.coefficients[:, 5:])
+    yield from kept(scene.motion, _of_motion)
     if isinstance(scene.top, PrescribedTop):
         values = np.zeros((1, 6, ORDER))
         values[0, :, 0] = [*scene.top.force, *scene.top.moment]
         yield from _wrench("top.force, top.moment", np.array([0.0, 1.0]), values)
     if scene.load is not None:
-        yield from _wrench("load", scene.load.knots, scene.load.coefficients)
+        yield from kept(scene.load, _of_load)
     if scene.top_rotation is not None:
-        yield _tilt("top_rotation", scene.top_rotation.knots, scene.top_rotation.coefficients)
+        yield kept(scene.top_rotation, _of_rotation)
     state = scene.initial_state
     if state is not None:
         for row in (*state.q, *state.v):
@@ -101,6 +102,24 @@ def plane_inputs(scene: SceneFields) -> Iterator[PlaneInput]:
             yield _constant("initial_state", row[2:])
         for pair in state.h:
             yield _constant("initial_state", pair)
+
+
+def _of_motion(motion: Motion) -> tuple[PlaneInput, ...]:
+    moving = motion.coefficients.copy()
+    moving[:, :, 0] -= moving[0, :, 0]
+    return (
+        PlaneInput("motion", motion.knots, moving[:, :2]),
+        _tilt("rotation of the base", motion.knots, motion.coefficients[:, 3:5]),
+        PlaneInput("rotation of the base", motion.knots, motion.coefficients[:, 5:]),
+    )
+
+
+def _of_load(load: Load) -> tuple[PlaneInput, ...]:
+    return tuple(_wrench("load", load.knots, load.coefficients))
+
+
+def _of_rotation(rotation: Rotation) -> PlaneInput:
+    return _tilt("top_rotation", rotation.knots, rotation.coefficients)
 
 
 def _constant(name: str, values: tuple[float, ...], euler_angles: bool = False) -> PlaneInput:

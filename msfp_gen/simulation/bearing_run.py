@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from msfp_gen.common.arrays import Array
@@ -43,6 +44,7 @@ from msfp_gen.simulation.start import (
 from msfp_gen.simulation.system import finish
 from msfp_gen.specification.layout import Effects
 
+Parts = list[tuple[Model, Array, float]]  # of segments with rows: model, rows and azimuth of its frame
 STEPS_PER_CALL = 4000  # of the compiled run, without the GIL; Ctrl-C, progress and checkpoints are handled in between
 
 
@@ -169,12 +171,10 @@ class BearingRun:
         failed_at_once = not any(segment.run.row_count for segment in self.segments)
         if with_initial_row and failed_at_once and last.status != "interrupted":
             last.run.record_now()
-        parts = [(s, rows) for s in self.segments if len(rows := finite_rows(s.run.rows))]
+        parts = [(s.model, rows, s.azimuth) for s in self.segments if len(rows := finite_rows(s.run.rows))]
         if not parts:
             raise RunError(message_of(self.settled, last), status=last.status)
-        sprung, before = is_sprung(self.scene.top), start_temperatures(self.segments, self.scene)
-        histories = [history_of(segment.model, rows, segment.azimuth, sprung) for segment, rows in parts]
-        result = _result(self, joined(histories, self.scene.output_step, before))
+        result = _result(self, parts)
         if not (self.repeated and result.succeeded and any(event.kind in INEXACT for event in result.events)):
             return result
         return with_gradient_errors(result, lambda changed: _finished(changed, gradient_errors=False, **self.repeated))
@@ -208,27 +208,40 @@ def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, t
     return replace(scene, initial_state=state), start_slopes(end.history, end.gradients, parameters)
 
 
-def _result(run: BearingRun, history: History) -> Result:
+def _result(run: BearingRun, parts: Parts) -> Result:
     scene, segments, parameters, last = run.scene, run.segments, run.parameters, run.segments[-1]
-    counts = [{k: int(n) for k, n in segment.run.counts.items()} for segment in segments]
-    total = Counters(**{name: sum(count[name] for count in counts) for name in counts[0]})
-    extremes = extremes_of(segments)
+    effects, counts = last.model.effects, [segment.run.counts for segment in segments]
     events = tuple(event for s in segments for event in events_of(s.run, s.azimuth))
     return Result(
         scene=scene,
-        history=history,
+        history=partial(_history, parts),
         events=events,
-        counters=replace(total, wall_time=sum(segment.wall for segment in segments)),
+        counters=Counters(
+            **{name: sum(int(count[name]) for count in counts) for name in counts[0]},
+            wall_time=sum(segment.wall for segment in segments),
+        ),
         status=last.status,
         message="" if last.status in ("ok", "stopped") else message_of(scene, last),
         provenance=provenance_of(scene.solver, ", then ".join(segment.model.spec.key for segment in segments))
         | {"build_seconds": f"{sum(segment.setup for segment in segments):.3g}"},
-        notes=tuple(run.notes)
-        + history_notes(scene, last.model.effects, history, total.steps, extremes)
-        + landing_notes(events)
-        + (gradient_notes(scene, last.model.effects, events) if parameters else ()),
-        recorded_extremes=extremes,
-        gradients=run_gradients(scene, last, parameters, run.energies, len(history.time), events)
+        notes=partial(_notes, tuple(run.notes), effects, gradient_notes(scene, effects, events) if parameters else ()),
+        recorded_extremes=extremes_of(segments),
+        gradients=run_gradients(scene, last, parameters, run.energies, len(parts[-1][1]), events)
         if parameters
         else None,
     )
+
+
+def _history(parts: Parts, run: Result) -> History:
+    """The history of a result."""
+    scene, before = run.scene, start_temperatures(parts[-1][0].effects.law, run.scene)
+    histories = [history_of(model, rows, azimuth, is_sprung(scene.top)) for model, rows, azimuth in parts]
+    return joined(histories, scene.output_step, before)
+
+
+def _notes(
+    of_monitors: tuple[Note, ...], effects: Effects, of_gradients: tuple[Note, ...], run: Result
+) -> tuple[Note, ...]:
+    """The notes of a result. effects: of its last segment."""
+    of_rows = history_notes(run.scene, effects, run.history, run.counters.steps, run.recorded_extremes)
+    return of_monitors + of_rows + landing_notes(run.events) + of_gradients

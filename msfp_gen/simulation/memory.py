@@ -10,6 +10,7 @@ import math
 import os
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 from msfp_gen.common.errors import InputError
@@ -30,8 +31,8 @@ def require_memory(scenes: Sequence[Scene]) -> None:
     are not counted: their steps are not known before.
     """
     counted = [scene for scene in scenes if _row_step(scene) < math.inf]
-    needed, room = sum(map(_needed, counted)), available()
-    if needed <= max(room, SMALL):
+    needed = sum(map(_needed, counted))
+    if needed <= SMALL or needed <= (room := available()):
         return
     worst = max(counted, key=_needed)
     step = _row_step(worst)
@@ -48,6 +49,7 @@ def outgrown(rows: int, surfaces: int) -> bool:
     return size > SMALL and (COPIES - 1) * size > available()
 
 
+@cache
 def row_size(surfaces: int) -> int:
     """Size of one row of a result [bytes]."""
     sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -18,6 +17,7 @@ from msfp_gen.scene.effect_switching import Ending
 from msfp_gen.scene.friction_parameters import law_parameters
 from msfp_gen.scene.scene import Scene
 from msfp_gen.specification.contract import EVENT_KINDS, WORKS, names
+from msfp_gen.specification.friction_laws import Law
 
 _EVENT_KINDS = names(EVENT_KINDS)
 
@@ -126,12 +126,11 @@ class Segment:
         return Ending(self.model.effects, self.status, self.run.time, surface, value, self.run.trips)
 
 
-def start_temperatures(segments: Sequence[Segment], scene: Scene) -> dict[str, Array]:
+def start_temperatures(law: Law | None, scene: Scene) -> dict[str, Array]:
     """The temperature of every surface at the start as "temperature", shape (n-1,) [degC]; nothing without one.
 
-    It is that of the rows of earlier models without heat, and of the friction law in them.
+    It is that of the rows of earlier models without heat, and of the friction law in them. law: of the last model.
     """
-    law = segments[-1].model.effects.law
     if law is None or not law.depends_on_temperature:
         return {}
     parameters = [law_parameters(law, scene.bearing, index) for index in range(scene.bearing.layout.surfaces)]

@@ -14,6 +14,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
+from msfp_gen.common.later import kept
 from msfp_gen.model.compiled import Port, Run, bodies_and_surfaces, separations_at_rest, top_values
 from msfp_gen.model.model import Model, stack_values
 from msfp_gen.model.plane import (
@@ -172,7 +173,7 @@ class Frame:
         if not azimuth:
             return cls(0.0, scene.motion, knots, wrench, rotation)
         planar_rotation = None if rotation is None else tilt_pieces(rotation, azimuth)
-        motion, wrench = motion_in_plane(scene.motion, azimuth), wrench_in_plane(wrench, azimuth)
+        motion, wrench = kept(scene.motion, motion_in_plane, azimuth), wrench_in_plane(wrench, azimuth)
         return cls(azimuth, motion, knots, wrench, planar_rotation)
 
 
@@ -224,9 +225,8 @@ def run_arguments(
 ) -> RunArguments:
     """The arguments of a compiled run from a state, without monitors. end: as of `start_run`."""
     solver, stop, grid = scene.solver, scene.stop, time_grid(scene)
-    anchor = frame.motion.displacement(0.0)[:2]
     arrays = (
-        *snapped(frame.motion.knots, frame.motion.coefficients, grid.stops),
+        *kept(frame.motion, _snapped, grid),
         *snapped(frame.load_knots, frame.wrench, grid.stops),
         grid.jumps,
         *state,
@@ -250,7 +250,7 @@ def run_arguments(
     if frame.rotation is not None and scene.top_rotation is not None:
         support = snapped(*_support_rotation(scene, frame.rotation), grid.stops)
         options["support_knots"], options["support_coefficients"] = support
-    return RunArguments(stack_values(spec, scene.bearing, scene.top, anchor), arrays, options)
+    return RunArguments(stack_values(spec, scene.bearing, scene.top, frame.motion.start[:2]), arrays, options)
 
 
 def wrench_pieces(scene: Scene) -> tuple[Array, Array]:
@@ -277,8 +277,18 @@ def _support_rotation(scene: Scene, coefficients: Array) -> tuple[Array, Array]:
 
 def time_grid(scene: Scene) -> TimeGrid:
     """Times at which steps of a run of `scene` must end, and limits of the step."""
-    histories = [history for history in (scene.motion, scene.load, scene.top_rotation) if history is not None]
-    return TimeGrid.of_histories(histories, scene.end, (scene.solver.max_step, scene.motion.max_step))
+    return kept(scene.motion, _time_grid, scene.load, scene.top_rotation, scene.end, scene.solver.max_step)
+
+
+def _time_grid(
+    motion: Motion, load: Load | None, rotation: Rotation | None, end: float, max_step: float | None
+) -> TimeGrid:
+    histories = [history for history in (motion, load, rotation) if history is not None]
+    return TimeGrid.of_histories(histories, end, (max_step, motion.max_step))
+
+
+def _snapped(motion: Motion, grid: TimeGrid) -> tuple[Array, Array]:
+    return snapped(motion.knots, motion.coefficients, grid.stops)
 
 
 def _initial_state(scene: Scene, model: Model, frame: Frame) -> tuple[Array, Array, Array]:
@@ -298,7 +308,7 @@ def seats_at_start(scene: Scene, model: Model, frame: Frame, state: tuple[Array,
     return seats.Start(
         scene.bearing.gravity,
         *bodies_and_surfaces(scene.bearing, model.effects, scene.top),
-        top_values(scene.top, anchor=frame.motion.displacement(0.0)[:2]),
+        top_values(scene.top, anchor=frame.motion.start[:2]),
         *state,
         base=values_at_start(frame.motion.coefficients),
         load=frame.wrench[0, :, 0].copy(),
@@ -345,16 +355,16 @@ TILTING, RESTING = 10.0, 2.0  # duration of the tilting of the plates, and of th
 
 def needs_settling(scene: Scene) -> bool:
     """Whether base or support of the top are tilted at the start, and no initial state is given."""
-    base = np.any(scene.motion.rotation(0.0)[:2])
+    base = np.any(scene.motion.start[3:5])
     support = scene.top_rotation is not None and np.any(scene.top_rotation.evaluate(0.0))
     return scene.initial_state is None and bool(base or support)
 
 
 def settling_scene(scene: Scene) -> Scene:
     """The run before a run: the plates are tilted from level to their rotation at time zero, under the load at zero."""
-    psi, theta = (float(x) for x in scene.motion.rotation(0.0)[:2])
+    psi, theta = (float(x) for x in scene.motion.start[3:5])
     position = np.zeros((1, 6, ORDER))
-    position[0, :3, 0] = scene.motion.displacement(0.0)
+    position[0, :3, 0] = scene.motion.start[:3]
     motion = Motion(np.array([0.0, TILTING + RESTING]), position).rocking(Rotation.ramp(psi, theta, duration=TILTING))
     rotation = scene.top_rotation
     if rotation is not None:
