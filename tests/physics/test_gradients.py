@@ -159,6 +159,7 @@ def test_differences_with_the_same_steps_through_frictional_heating(method: str)
     assert values["temperature"].max() > 40.0
 
 
+@pytest.mark.slow
 def test_extremes_of_a_friction_law_that_heats_are_those_of_the_steps() -> None:
     """With a row at every step their derivatives are those of the rows."""
     scene = heated(patch_radius=0.15)
@@ -388,6 +389,7 @@ def dissipated(tilts: Array, load: float, mu: float, radius: float, arm: float, 
     return total
 
 
+@pytest.mark.slow
 def test_energy_dissipated_by_a_single_pendulum_in_closed_form() -> None:
     """Two cycles at constant friction: mu N times the path, and its derivative."""
     scene = single()
@@ -405,6 +407,7 @@ def test_energy_dissipated_by_a_single_pendulum_in_closed_form() -> None:
     assert found == pytest.approx((above - below) / (2 * step), rel=2e-5)
 
 
+@pytest.mark.slow
 def test_a_single_pendulum_in_closed_form() -> None:
     """While it slides, moments about the sphere centre give F cos - W sin = R mu N/a, N^2 (1 + mu^2) = F^2 + W^2.
 

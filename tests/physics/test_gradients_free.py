@@ -132,9 +132,8 @@ Case = Callable[[], tuple[Scene, dict[str, float]]]
 slow = pytest.mark.slow
 
 
-@pytest.mark.parametrize(
-    "case", [smooth_single, pytest.param(smooth_double, marks=slow), pytest.param(smooth_triple, marks=slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [smooth_single, smooth_double, smooth_triple])
 def test_differences_with_free_steps_in_smooth_runs(case: Case) -> None:
     check_free(*case(), 1e-6)
 

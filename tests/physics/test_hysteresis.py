@@ -179,7 +179,11 @@ def test_a_run_that_creeps_says_so() -> None:
     assert 0.3 * moved < note.value < 1.05 * moved  # part of it in rows where friction is nearly mobilised
 
 
-CREEPING = [("double-fp", 0.1, 0.02, 2e6), ("prototype-tfp", 0.08, 0.02, 112e3), ("quintuple-fp", 0.25, 0.0, 112e3)]
+CREEPING = [
+    ("double-fp", 0.1, 0.02, 2e6),
+    ("prototype-tfp", 0.08, 0.02, 112e3),
+    pytest.param("quintuple-fp", 0.25, 0.0, 112e3, marks=pytest.mark.slow),
+]
 
 
 @pytest.mark.parametrize(("name", "pushed", "back", "load"), CREEPING)
@@ -223,6 +227,7 @@ def vibrating(amplitude: float, **solver: Any) -> Scene:
     return Scene(bearing, motion, top, effects, Solver(**{"rtol": 1e-4, **solver}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output_step", [None, 0.01])
 def test_vibrations_of_a_stuck_mass_whose_errors_add_up_are_noted(output_step: float | None) -> None:
     """The number is the true error within a factor of four; at a tight tolerance there is no note."""

@@ -49,6 +49,7 @@ def offset(scene: Scene, base: float, top: float) -> float:
     return (below * base + above * top) / (below + above - height)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("base", "top"),
     thinned([(0.01, 0.0), (0.0, 0.01), (0.01, 0.01), (0.01, -0.01)], lambda base, top: base == -top),
@@ -59,6 +60,7 @@ def test_a_tilted_plate_shifts_the_loop_by_the_lean_of_the_line_of_force(base: f
     assert middle(simulate(scene)) == pytest.approx(offset(scene, base, top), abs=1e-2 * (abs(base) + abs(top)))
 
 
+@pytest.mark.slow
 def test_tilt_about_e1_is_tilt_about_e2_seen_from_the_side() -> None:
     """A quarter turn takes E1 to E2, and theta, a tilt towards E1, to -psi, the same tilt towards E2."""
     one = simulate(double(motion=PUSH.rocking(Rotation.constant(theta=0.01)), top_rotation=Rotation.constant(0, 0.005)))
@@ -136,6 +138,7 @@ def test_a_constant_load_is_an_axial_load() -> None:
     np.testing.assert_allclose(simulate(parts).history.top_force, whole.history.top_force, atol=2e-4 * WEIGHT)
 
 
+@pytest.mark.slow
 def test_the_normal_force_follows_a_varying_load_and_its_jumps() -> None:
     load = Load.from_arrays([0, 4, 4, 8, 12], np.outer([0, 0, 1, -1, -1], [0.0, 0.0, 0.3 * WEIGHT]))
     result = simulate(double(motion=STILL, load=load, output_step=None))
@@ -259,6 +262,7 @@ def test_a_rotation_that_stops_dead_is_refused() -> None:
         Rotation(np.array([0.0, 1.0, 2.0]), np.arange(24.0).reshape(2, 2, 6) / 1e3)
 
 
+@pytest.mark.slow
 def test_a_load_that_changes_is_no_constant_load() -> None:
     more = Load.constant((0.0, 0.0, -0.5 * WEIGHT))
     still = simulate(double(motion=STILL, load=more))

@@ -171,6 +171,7 @@ def test_no_row_between_steps_shows_a_surface_that_pulls(method):
     assert min(history.energy[name].min() for name in ("rim_stored", "seat_dissipated", "friction_dissipated")) > -1e-3
 
 
+@pytest.mark.slow
 def test_a_plate_that_flips_in_flight_has_its_remedy() -> None:
     """A single pendulum is lifted and turned at once; the spring that the message names holds its plate level."""
     weight, thrown = 2e6, np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0])

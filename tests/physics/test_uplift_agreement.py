@@ -226,6 +226,7 @@ def stuck(effects):
     return Scene(bearing, motion, top, effects, Solver(rtol=1e-6), output_step=1e-3)
 
 
+@pytest.mark.slow
 def test_a_stuck_mass_has_one_stiffness():
     """The yield displacement contains the contact: without this the frequencies differ, and forces by 15 %."""
     runs = [simulate(stuck(replace(PLANAR, uplift=uplift, bouc_wen="plastic"))).history for uplift in (False, True)]
@@ -282,6 +283,7 @@ def growth(scene, time):
     return vibrations.real.max()
 
 
+@pytest.mark.slow
 def test_sliders_do_not_vibrate_in_their_seats():
     """With seats that are damped along the compression alone a vibration at 2.6 kHz grows at 18 1/s."""
     bearing = presets.bearing("single-articulated-fp").replace(
@@ -301,6 +303,7 @@ def test_sliders_do_not_vibrate_in_their_seats():
     assert max(growth(scene, time) for time in (2.8, 4.1)) < -1.0
 
 
+@pytest.mark.slow
 def test_the_start_under_an_oblique_load_is_differentiated():
     """Derivatives of the separations at the start, against the starts of other scenes."""
     scene = replace(oblique(0.2, 0.6, Effects(uplift=True)), output_step=None)

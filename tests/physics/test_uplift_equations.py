@@ -51,7 +51,7 @@ def joined(state: Any, gap: Separation) -> tuple[Array, Array, Array]:
 
 
 @pytest.mark.parametrize("stand", STANDS)
-@pytest.mark.parametrize("spin", ["locked", "free"])
+@pytest.mark.parametrize("spin", ["locked", pytest.param("free", marks=pytest.mark.slow)])
 def test_balances_with_uplift_equal_plain_vectors(spin: str, stand: str) -> None:
     values, state, gap, h, load = a_state(stand)
     bearing, model = bearing_of(values), model_of(LAYOUT, uplift=True, spin=spin)
@@ -70,7 +70,9 @@ def test_balances_with_uplift_equal_plain_vectors(spin: str, stand: str) -> None
 
 
 @pytest.mark.parametrize("stand", STANDS)
-@pytest.mark.parametrize("effects", [{}, {"spin": "free"}, {"dimension": "planar"}], ids=str)
+@pytest.mark.parametrize(
+    "effects", [{}, pytest.param({"spin": "free"}, marks=pytest.mark.slow), {"dimension": "planar"}], ids=str
+)
 def test_accelerations_with_uplift_solve_the_balances(effects: dict[str, Any], stand: str) -> None:
     """Both formulations are one, and the reference is satisfied by what they find."""
     planar = effects.get("dimension") == "planar"
@@ -261,6 +263,7 @@ def test_an_ode_with_uplift_has_the_rows_of_a_run_that_flies() -> None:
         assert (seen["normal"][opened] < 1e-5).all()
 
 
+@pytest.mark.slow
 def test_radau_with_uplift_goes_where_simulate_goes() -> None:
     scene = Scene(
         presets.bearing("fenz-tfp"),

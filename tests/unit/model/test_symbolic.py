@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import ROOT, bearing_of, model_of
+from support import ROOT, bearing_of, model_of, thinned
 from support.random_states import inputs, sensible
 
 from msfp_gen import Effects, InputError, Layout, Top, presets, symbolic
@@ -69,7 +69,10 @@ def test_equations_in_sympy_are_those_of_the_compiled_model(layout, met):
     assert set(named) - {f"t_{k}" for k in range(1, layout[0] + 1)} == {name for x in points for name in x.names}
 
 
-@pytest.mark.parametrize("effects", [{}, {"sliders": "massless"}, {"spin": "patch"}, {"friction": "velocity"}], ids=str)
+OTHERS = [{"sliders": "massless"}, {"spin": "patch"}, {"friction": "velocity"}]
+
+
+@pytest.mark.parametrize("effects", thinned([{}, *OTHERS], lambda effects: not effects), ids=str)
 @pytest.mark.parametrize("dimension", ["planar", "spatial"])
 def test_effects_are_those_of_the_compiled_model(dimension, effects):
     if dimension == "planar" and "spin" in effects:

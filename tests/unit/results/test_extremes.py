@@ -60,6 +60,7 @@ def test_parted_surfaces_do_not_slide() -> None:
     assert speed.tolist() == pytest.approx([whole[:, 0].max(), 0.0, whole[:100, 2].max(), whole[:, 3].max()])
 
 
+@pytest.mark.slow
 def test_every_extreme_is_that_of_rows_close_together() -> None:
     """A motion in two directions over surfaces that warm up, with rows so far apart that they miss all extremes."""
     scene = replace(heated(0.03), motion=Motion.harmonic(0.05, 0.5, cycles=2.0, direction=0.6))

@@ -304,6 +304,7 @@ def test_uplift_in_the_summary_and_in_tables() -> None:
     assert "height [mm]  longest [ms]  times" in text
 
 
+@pytest.mark.slow
 def test_temperatures_of_a_building_begin_at_the_start() -> None:
     hot, cold = heated_building(), at_the_rims()
     assert np.all(hot.temperature[0] == 20.0) and np.all(np.diff(hot.temperature, axis=0).max(axis=0) > 0)

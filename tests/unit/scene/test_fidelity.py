@@ -72,6 +72,7 @@ def test_each_level_runs_alone_and_says_what_it_cannot_see(word):
         assert run.summary[name]["radial"] == pytest.approx(exact.summary[name]["radial"], rel=within)
 
 
+@pytest.mark.slow
 def test_a_reduced_scene_is_written_and_read_as_it_is(tmp_path):
     run = simulate(changed_scene("fenz-test2", {"fidelity": "equivalent", "effects.dimension": "planar"}))
     path = run.to_netcdf(tmp_path / "run.nc")
@@ -137,6 +138,7 @@ def test_of_regimes_with_one_slope_the_first_is_taken():
         assert main_regime(Backbone.of(raised))[0] / factor == pytest.approx(0.0317254, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_model_of_one_ground_takes_that_of_the_bearings():
     """The motion below the bearings, not that of the scene which none of them has; two of them are refused."""
     scene = changed_scene("hospital-clc", {"motion.duration": 6.0})
@@ -160,6 +162,7 @@ def test_the_equivalent_of_a_building_is_judged_by_its_displacement_alone():
     assert at_fidelity(scene, "rigid").limits == limits
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "reference"), [(1.4, 5e7), (1.0, 3.4e6)])
 def test_no_level_drops_the_friction_law(factor, reference):
     """Pressure below the reference raises friction by half, which levels without the law did not see."""
@@ -187,6 +190,7 @@ def test_the_constant_friction_of_a_law_is_that_of_the_formula():
     assert peak_speed(motion, 4.0) == pytest.approx(np.abs(slopes).max(), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_cheaper_models_add_rims_and_heat_where_the_scene_lets_them():
     """A level that fixed the effects of the start would leave out what the exact run takes in on its way."""
     massless = changed_scene("fenz-test5", {"fidelity": "massless", "effects": {}})
@@ -198,6 +202,7 @@ def test_cheaper_models_add_rims_and_heat_where_the_scene_lets_them():
     assert pushed.modelled.friction == "pv" and "pvt" in simulate(pushed).provenance["model"]
 
 
+@pytest.mark.slow
 def test_surfaces_of_one_pendulum_are_none_of_the_device(tmp_path):
     """No verdict, note, table or column is about a surface or a body that the device does not have."""
     changes = {"motion.duration": 12.0, "fidelity": "equivalent"}

@@ -186,7 +186,7 @@ class Seeds:
         self.arrays = arrays
 
 
-@pytest.mark.parametrize("uplift", [False, True])
+@pytest.mark.parametrize("uplift", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("layout", [(2, 0, 1), (3, 1, 1)])
 def test_every_value_of_bearing_and_top_is_differentiated(layout: tuple[int, int, int], uplift: bool) -> None:
     """Derivatives of what the compiled run is given, against differences of it."""

@@ -67,6 +67,7 @@ def test_a_tolerance_above_the_force_of_a_stiff_spring_is_noted() -> None:
     assert noted(0.5, sliders="massless") == ()
 
 
+@pytest.mark.slow
 def test_rows_whose_peak_force_is_above_that_of_the_steps_are_noted() -> None:
     """A plate of 271 kg on a rig of 0.6 GN/m: of 0.94 % of friction by which its peak is off, steps have 0.21 %."""
     scene = auto_scenes.campaign(21, 24)
