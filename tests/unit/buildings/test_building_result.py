@@ -32,6 +32,7 @@ from msfp_gen.studies.bounding import CASES, Bounds, load_factors
 from msfp_gen.studies.bounding.runs import Case, _quantity_table
 
 
+@pytest.mark.slow
 def test_the_note_of_a_cheaper_model_is_read_from_the_file(tmp_path: Path):
     run = simulate(at_fidelity(replace(pushed_scene(), duration=0.05), "rigid"))
     read = load_result(run.to_netcdf(tmp_path / "run.nc"))

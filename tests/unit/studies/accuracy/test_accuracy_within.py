@@ -163,6 +163,7 @@ def test_ringing_that_hardly_acts_is_in_the_estimate():
     assert not simulate_within(massless, 0.02).left_out
 
 
+@pytest.mark.slow
 def test_models_are_not_built_within_the_budget(monkeypatch):
     """A bearing that heats goes on with a model of its temperatures: one hour each would end any search."""
     built, real, clock = [], model.load, model.perf_counter
@@ -194,6 +195,7 @@ def test_slow_ringing_of_stuck_sliders_is_in_the_estimate(mass, amplitude, frequ
     assert largest_error(errors(run_native("implicit", scene, 1e-3, 60.0, repeats=0), exact)) > 0.05
 
 
+@pytest.mark.slow
 def test_a_reference_run_of_many_short_steps_is_more_accurate_than_the_run():
     """Newton's method leaves a share of the tolerance in every stage: at a tenth it was off by more than the run."""
     scene = load_scene("double-articulated-push")
