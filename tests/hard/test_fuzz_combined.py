@@ -26,6 +26,7 @@ def test_the_combined_campaign(tmp_path: Path) -> None:
     assert table["faults"] == [] and table["ends"]["ok"] > 200 and table["verdicts"]["agrees"] > 200
 
 
+@pytest.mark.slow
 def test_scenes_are_of_every_kind_and_the_same_again() -> None:
     scenes = [fuzz_combined.case(2, number).scene for number in range(30)]
     assert all(scene == fuzz_combined.case(2, number).scene for number, scene in enumerate(scenes[:3]))

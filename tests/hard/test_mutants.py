@@ -46,6 +46,7 @@ def test_c_is_changed_outside_comments_and_directives() -> None:
     assert all(line.endswith("// x + 1") for line in changed)
 
 
+@pytest.mark.slow
 def test_a_round_is_the_same_again_and_of_every_part() -> None:
     one, two = (mutants.drawn(40, 1, list(mutants.PARTS)) for _ in range(2))
     assert one == two != mutants.drawn(40, 2, list(mutants.PARTS))

@@ -93,6 +93,7 @@ def test_moments_of_the_axial_forces_are_those_of_the_frame():
     assert moment == pytest.approx(overturning, abs=1e-5 * 4 * LOAD)
 
 
+@pytest.mark.slow
 def test_uplift_that_opens_on_the_way_is_that_from_the_start(monkeypatch):
     """The compliance of the contacts is taken out of the interfaces: N does not depend on when they open.
 

@@ -51,6 +51,7 @@ def story(rotational_stiffness: float) -> dict[tuple[str, int], Transition]:
     return {(t.what, t.surface): t for t in told}
 
 
+@pytest.mark.slow
 def test_triple_pendulum_with_level_plates() -> None:
     """u** = 47.3 mm (formulas with effective radii give 39), and the five stages of Section 4.1 in order."""
     told = story(LEVEL)
@@ -157,6 +158,7 @@ def test_rounded_corners_move_the_transitions_little() -> None:
     assert fourth == pytest.approx((0.13089, 0.26398), rel=3e-4)
 
 
+@pytest.mark.slow
 def test_loop_closes_and_is_odd() -> None:
     """After a full cycle the loop repeats, and the half loop at -d is the mirror image."""
     push = Push(fenz(), N, K_THETA)

@@ -92,7 +92,7 @@ def case(word: str, **effects: Any) -> tuple[Any, ...]:
 
 @pytest.mark.parametrize(
     ("word", "dimension"),
-    thinned(product(LAWS, ["planar", "spatial"]), lambda word, dimension: dimension == "planar"),
+    thinned(product(LAWS, ["planar", "spatial"]), lambda word, dimension: dimension == "planar" and word != "velocity"),
 )
 def test_coefficient_equals_the_reference(word: str, dimension: str) -> None:
     model, bearing, state, h, load, heat = case(word, dimension=dimension)

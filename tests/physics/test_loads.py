@@ -80,9 +80,10 @@ def test_a_planar_run_with_turning_plates_is_the_spatial_one() -> None:
     assert difference < 5e-3 * np.abs(full.history.top_force[:, 0]).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effects",
-    [Auto(rims=True), pytest.param(Effects(top_rotation=True), marks=pytest.mark.slow)],
+    [Auto(rims=True), Effects(top_rotation=True)],
     ids=["auto", "everything"],
 )
 def test_energy_closes_with_loads_and_turning_plates(effects: Auto | Effects) -> None:
@@ -122,6 +123,7 @@ def test_a_slider_without_friction_finds_the_lowest_point_of_a_tilted_dish() -> 
     assert result.history.sliding[-1, 0] == pytest.approx(scene.bearing.surfaces[0].radius * 0.02, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_run_starts_where_slow_turning_of_its_plates_leaves_it() -> None:
     tilted = double(motion=STILL.rocking(Rotation.constant(theta=0.01)))
     turned = double(motion=STILL.rocking(Rotation.ramp(theta=0.01, duration=10.0)))

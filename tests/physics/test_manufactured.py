@@ -17,7 +17,7 @@ from reference.kinematics import State
 from support.manufactured import KNOTS, Solution, fixed_steps, orders, resolved, run, solve
 from support.manufactured_cases import KNEES, ORDERS, knees, quasistatic, resolvable, smooth, storey_orders
 
-QUICK = ("spatial", "rims, planar", "sprung top")  # space, plane and contact, another unknown
+QUICK = ("spatial",)
 REDUCED = {"esdirk4": (1.5, 2.2)}  # of the temperature, whose fastest parts take 0.2 ms: the order of a stage
 
 

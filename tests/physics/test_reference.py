@@ -104,6 +104,7 @@ def test_energy_cases_reach_the_rims() -> None:
     assert sum(pressed) >= 6
 
 
+@pytest.mark.slow
 def test_drilling_dissipates_and_rims_push_back() -> None:
     for seed in range(6):
         stack, state, h, load = random_case((5, 2, 2), 30 + seed)
@@ -248,6 +249,7 @@ def test_compound_pendulum_by_hand() -> None:
     assert found.acceleration[0, 0] == pytest.approx(-3.0 * 9.8 * arm * np.sin(0.3) / (0.02 + 3.0 * arm**2), rel=1e-10)
 
 
+@pytest.mark.slow
 def test_period_is_the_elliptic_integral() -> None:
     from scipy.integrate import solve_ivp
     from scipy.special import ellipk

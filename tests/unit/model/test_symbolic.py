@@ -172,9 +172,10 @@ def test_what_does_not_belong_is_refused():
         model.position.jacobian(model.state)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("layout", "planar"),
-    [(Layout.dfp(), True), *(pytest.param(Layout.tfp(), planar, marks=pytest.mark.slow) for planar in (True, False))],
+    [(Layout.dfp(), True), (Layout.tfp(), True), (Layout.tfp(), False)],
 )
 def test_latex_parses_as_mathematics(layout, planar):
     from matplotlib.mathtext import MathTextParser
