@@ -230,29 +230,6 @@ def test_files_give_loads_and_rotations_with_units() -> None:
     assert scene.modelled.top_rotation
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"load": {"kind": "samples", "time": [0, 2], "force": [[0, 0, 0]]}}, "load: 1 rows for 2 times"),
-        ({"load": {"kind": "samples", "time": [1, 2], "force": [[0, 0, 0]] * 2}}, "load.time"),
-        ({"load": {"kind": "push"}}, "load.kind = 'push'"),
-        ({"load": {"kind": "constant", "force": "1 kN"}}, "load.force"),
-        ({"load": {"kind": "constant", "forse": [0, 0, 1]}}, "load.forse"),
-        ({"top_rotation": {"kind": "constant", "psi": 5.0}}, "plates turn by less than 1 rad"),
-        ({"top_rotation": {"kind": "ramp", "psi": 0.1}}, "top_rotation.duration"),
-        (
-            {"top": {"kind": "prescribed", "force": [0, 0, -1e6]}},
-            "acts through rotational springs, and this prescribed top has none",
-        ),
-        ({"effects": {"dimension": "planar"}}, "leaves the vertical plane"),
-    ],
-)
-def test_what_does_not_fit_is_one_line(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(InputError) as error:
-        scene_from_table({**TABLE, **changes})
-    assert said in str(error.value) and "\n" not in str(error.value)
-
-
 def test_a_rotation_that_stops_dead_is_refused() -> None:
     with pytest.raises(InputError, match="velocity of theta_1 jumps"):
         PUSH.rocking(Rotation.harmonic(theta=0.01, frequency=1.0, cycles=1))

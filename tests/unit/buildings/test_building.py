@@ -212,24 +212,6 @@ def test_damping_of_rigid_motions_is_rejected():
         Building.from_matrices(m, 0.1 * m + 1e-3 * k, k, nodes=nodes)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"nodes": {"base": ([0, 1, 2], (0, 0, 0))}}, "six different indices"),
-        ({"nodes": {"base": ([0, 1, 2, 3, 4, 99], (0, 0, 0))}}, "outside of 0"),
-        ({"nodes": {"base": (range(6), (0, 0))}}, "three finite numbers"),
-        ({"nodes": {}}, "none carries bearings"),
-        ({"nodes": {"a": (range(6), (0, 0, 0)), "b": (range(3, 9), (0, 0, 0))}}, "coordinate 3 is that of another"),
-        ({"damping_ratio": 1.5}, "building.damping_ratio = 1.5: give"),
-        ({"rayleigh_frequencies": (3.0, 2.0)}, r"building.rayleigh_frequencies = \(3.0, 2.0\): give two rising"),
-    ],
-)
-def test_messages_of_bad_options(change, message):
-    m, k, nodes = frame_parts()
-    with pytest.raises(InputError, match=message):
-        Building.from_matrices(m, None, k, **{"nodes": nodes, **change})
-
-
 def test_messages_of_bad_files(tmp_path: Path):
     m, _, nodes = frame_parts()
     np.savez(tmp_path / "frame.npz", mass=m)

@@ -17,7 +17,6 @@ from msfp_gen import (
     Effects,
     InputError,
     Motion,
-    Rotation,
     RunError,
     Solver,
     load_scene,
@@ -86,33 +85,6 @@ def test_the_number_of_steps_is_limited():
     with pytest.raises(RunError, match=r"^building: stopped at t = ") as caught:
         simulate(scene(frame(), solver=Solver(max_steps=5)))
     assert caught.value.status == "steps" and caught.value.result.counters["steps"] == 5
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"bearings": []}, "scene.bearings: there are none"),
-        ({"duration": 1e3}, r"scene\.duration = 1000\.0: the motion lasts"),
-        ({"solver": Solver("dopri5")}, r"solver\.method = 'dopri5'"),
-        ({"motion": MOTION.rocking(Rotation.of([0.0, MOTION.duration], 1e-3 * np.eye(6)[None, :2]))}, "the ground"),
-        ({"motion": Motion.from_velocity(np.arange(5.0), np.ones((5, 3)))}, "it starts with 1 m/s"),
-        ({"bearings": [BuildingBearing(BEARING, INTERFACE, (3.0, 0.0))]}, "do not balance the weight"),
-        (
-            {"bearings": [BuildingBearing(BEARING, INTERFACE, p) for p in ((1, 1), (2, 1), (1, 2))]},
-            r"scene\.bearings\[1\]\.position: it would be in tension at rest \(-.* is outside the bearings, 1 to 2 m",
-        ),
-        ({"bearings": [BuildingBearing(BEARING, INTERFACE, node="roof")]}, r"scene\.bearings\[0\]\.node = 'roof'"),
-        ({"bearings": [BuildingBearing(BEARING, INTERFACE, node="floor 1")]}, "no bearing can be attached there"),
-        (
-            {"bearings": [BuildingBearing(BEARING.replace(gravity=g), INTERFACE) for g in (9.8, 9.81)]},
-            r"scene\.bearings\[1\]\.bearing\.gravity = 9\.81",
-        ),
-        ({"motion": 3}, r"scene\.motion = 3: give a Motion"),
-    ],
-)
-def test_messages_of_bad_scenes(change, message):
-    with pytest.raises(InputError, match=message):
-        replace(scene(frame()), **change)
 
 
 def test_messages_of_bad_bearings():

@@ -80,25 +80,6 @@ def test_a_reduced_scene_is_written_and_read_as_it_is(tmp_path):
     assert again.scene.bearing == run.scene.bearing and again.notes == run.notes
 
 
-BAD = {
-    "unknown": ({"fidelity": "cheap"}, "fidelity = 'cheap'"),
-    "loose already": ({"fidelity": "loose", "solver.rtol": 0.05}, "solver.rtol = 0.05 already"),
-    "rigid": ({"fidelity": "rigid"}, "one bearing has no such model"),
-    "prescribed": (
-        {"fidelity": "equivalent", "top": {"kind": "prescribed", "force": [0.0, 0.0, -1e5]}},
-        "it needs a top of kind 'rig' or 'mass'",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_levels_are_one_line(case):
-    changes, text = BAD[case]
-    with pytest.raises(InputError, match=text) as error:
-        changed_scene("fenz-test2", changes)
-    assert "\n" not in str(error.value)
-
-
 def test_an_initial_state_has_no_equivalent():
     scene = load_scene("fenz-test2")
     state = {"q": [[0.0] * 3] * 4, "v": [[0.0] * 3] * 4, "h": [[0.0] * 2] * 4}

@@ -42,35 +42,6 @@ def test_short_forms_and_other_parts() -> None:
     assert (amplitude.unit, amplitude.value) == ("m", 0.025)
 
 
-@pytest.mark.parametrize(
-    ("path", "part"),
-    [
-        ("bearing.surfaces[4].friction", "there are 4 of them; give an index from 0 to 3"),
-        ("bearing.surfaces.friction", r"there are 4 surfaces; give bearing.surfaces\[0\].friction"),
-        ("bearing.friction", r"give bearing.surfaces\[0\].friction, or"),
-        ("bearing.surfaces[0].frictio", "did you mean friction"),
-        ("bearing.surfaces[0].friction_slow", "effects.friction = 'constant' has no such number"),
-        ("bearing.surfaces[0].seat_stiffness", "this scene has no uplift, .* give uplift = true"),
-        ("bearing.bodies[0].inertia", "this field holds 2 numbers"),
-        ("bearing.base_centroid", "a run does not depend on it"),
-        ("bearing[0].gravity", "there is one bearing"),
-        ("top.mass", "top has no number 'mass'"),
-        ("top.vertical_stiffness", "this top has no vertical spring"),
-        ("motion.frequency", "give motion.scale or motion.direction or motion.amplitude"),
-        ("load.scale", "this scene has no load history"),
-        ("solver.rtol", "a run has no gradient with respect to it"),
-        ("initial_state.q[0]", "it needs 2 indices"),
-        ("friction", "no path of a parameter"),
-        ("bearing.surfaces[-1].friction", "no path of a parameter"),
-    ],
-)
-def test_what_is_no_parameter_is_refused_by_name(path: str, part: str) -> None:
-    with pytest.raises(InputError, match=part) as error:
-        parameters_of(SCENE, [path])
-    assert str(error.value).startswith(f"gradients = {path!r}: ")
-    assert "\n" not in str(error.value)
-
-
 def test_lists_are_checked() -> None:
     with pytest.raises(InputError, match="given twice"):
         parameters_of(SCENE, ["bearing.friction[0]", "bearing.surfaces[*].friction"])

@@ -172,35 +172,6 @@ def test_centroids_follow_the_report() -> None:
     assert bodies[0].centroid > bodies[0].height / 2  # the dish of the inner slider has its steel at its rim
 
 
-@pytest.mark.parametrize(
-    ("sheet", "changes", "message"),
-    [
-        (FENZ, {"friction": [0.1]}, "sheet.friction has 1 entries: a triple pendulum needs 4, or 2 of a symmetric"),
-        (FENZ, {"radius": None}, "height of radius, effective_radius, height is given; give two of them"),
-        (FENZ, {"height": [0.02, 0.023]}, "farther from the pivot than the one inside"),
-        (FENZ, {"slider_diameter": [0.102, 0.05, 0.051, 0.102]}, "both are faces of one rigid slider"),
-        (FENZ, {"friction": [0.03, 0.01, 0.02, 0.1]}, "sheet.friction of surfaces 2 and 3 = 0.01, 0.02"),
-        (FENZ, {"dish_diameter": [0.229, 0.089]}, "give either dish_diameter or capacity"),
-        (FENZ, {"capacity": None, "dish_diameter": [0.1, 0.089]}, "give more than the slider_diameter, 0.102"),
-        (FENZ, {"friction_lower": [0.02, 0.01]}, "give both friction_lower and friction_upper, or neither"),
-        (BOUNDED, {"friction_lower": [0.04, 0.01, 0.01, 0.08]}, "give at most its friction, 0.03"),
-        (FENZ, {"slider_diameter": [1.0, 0.051]}, "give less than twice the radius, 0.946"),
-        (FENZ, {"effective_radius": [0.5, 0.05], "height": None}, r"radius = effective_radius \+ height"),
-        (FENZ, {"rims": 1}, "sheet.rims: unknown name; give one of device"),
-        (FENZ, {"device": "quadruple"}, "sheet.device = 'quadruple': give one of 'single'"),
-        (SINGLE, {"friction": [0.06, 0.06]}, "a single pendulum needs 1"),
-    ],
-)
-def test_bad_sheets(sheet: dict[str, Any], changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Bearing.from_sheet(**{**sheet, **changes})
-
-
-def test_missing_name() -> None:
-    with pytest.raises(InputError, match=r"sheet\.axial_load is missing"):
-        Bearing.from_sheet(**{name: value for name, value in FENZ.items() if name != "axial_load"})
-
-
 def test_scene_file_takes_a_sheet_with_changes() -> None:
     """Texts with units, other keys that change the bearing; its complete table keeps friction at the pivot."""
     table = {"sheet": {**BOUNDED, "radius": ["0.473 m", 0.076]}, "mass": [1.0, 2.0, 1.0, 8.0], "gravity": 9.81}

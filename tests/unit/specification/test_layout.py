@@ -2,6 +2,7 @@ import pickle
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from msfp_gen.common.errors import InputError
@@ -91,3 +92,10 @@ def test_public_names_lead_to_their_homes():
     assert set(msfp_gen._MODULES) | {"__version__"} == set(msfp_gen.__all__) <= set(dir(msfp_gen))
     with pytest.raises(AttributeError, match="nonsense"):
         _ = msfp_gen.nonsense
+
+
+def test_a_word_of_an_array_is_a_word():
+    effects = Effects(sliders=np.array(["massless"])[0])
+    assert effects == Effects(sliders="massless") and type(effects.sliders) is str
+    with pytest.raises(InputError, match=r"effects\.rims = 1: give one of True, False"):
+        Effects(rims=1)
