@@ -16,10 +16,11 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, errors_at
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import InputCache, digest_of, expecting
-from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.file.loader import (
+    NO_PARTS,
+    Parts,
     bearing_from_table,
     effects_from_table,
     scene_parts,
@@ -93,13 +94,13 @@ MATRICES = paths_in(FrameTable)
 
 
 def building_from_table(
-    table: Mapping[str, Any], folder: Path | None = None, motion: Motion | None = None
+    table: Mapping[str, Any], folder: Path | None = None, parts: Parts = NO_PARTS
 ) -> BuildingScene | Scene:
     """The scene of a building from a plain table, as in a file; a `Scene` with fidelity = "equivalent".
 
-    folder, motion: as in `scene_from_table`. Raises InputError.
+    folder, parts: as in `scene_from_table`, of all but `building` and `bearings`. Raises InputError.
     """
-    parts, _ = scene_parts(SCENE, table, folder, motion)
+    parts = scene_parts(SCENE, table, folder, parts)
     frame, named = parts.pop("building"), parts.pop("bearings", {})
     parts["building"] = _building(frame, folder)
     common = {name: frame[name] for name in COMMON if name in frame}

@@ -120,6 +120,8 @@ class Quantity:
 
         Raises ValueError that states the remedy only; the caller adds the field and the value.
         """
+        if type(value) is float and not (self.shape or self.whole) and self.limits[0] <= value <= self.limits[1]:
+            return value  # the most frequent case, without the questions of the others
         if self.pair and not _is_sequence(value):
             value = (value, value)
         return self._parse(value, self.shape, text)
@@ -251,9 +253,11 @@ def check_fields(instance: Any, path: str) -> None:
         if value is None and default is None:
             continue
         try:
-            object.__setattr__(instance, name, rule.parse(value))
+            parsed = rule.parse(value)
         except ValueError as error:
             raise InputError(f"{path}.{name} = {value!r}: {error}") from None
+        if parsed is not value:
+            object.__setattr__(instance, name, parsed)
 
 
 @contextmanager
@@ -282,21 +286,20 @@ def _one_line(value: object, most: int = 80) -> str:
     return text if len(text) <= most else f"{text[:most]}..."
 
 
-def ruled_fields(kind: type) -> Iterator[tuple[str, Rule, object]]:
+def ruled_fields(kind: type) -> tuple[tuple[str, Rule, object], ...]:
     """(name, rule, default) of every field of the dataclass `kind` that has a rule; MISSING for no default."""
-    rules = _rules(kind)
-    return ((field.name, rules[field.name], field.default) for field in dataclass_fields(kind) if field.name in rules)
+    return _ruled_fields(kind)
+
+
+@lru_cache(maxsize=64)
+def _ruled_fields(kind: type) -> tuple[tuple[str, Rule, object], ...]:
+    hints = get_type_hints(kind, include_extras=True)
+    ruled = ((field, _rule(hints[field.name])) for field in dataclass_fields(kind))
+    return tuple((field.name, rule, field.default) for field, rule in ruled if rule is not None)
 
 
 # Rules of fields that are annotated with a plain type.
 _TYPE_RULES: dict[Any, Rule] = {bool: Choice((True, False)), str: Text(), str | None: Text()}
-
-
-@lru_cache(maxsize=64)
-def _rules(kind: type) -> dict[str, Rule]:
-    hints = get_type_hints(kind, include_extras=True)
-    rules = {name: _rule(hint) for name, hint in hints.items()}
-    return {name: rule for name, rule in rules.items() if rule is not None}
 
 
 def _rule(hint: Any) -> Rule | None:

@@ -223,7 +223,8 @@ def _scene(root: StoredGroup, about: Mapping[str, Attribute]) -> Scene:
         raise ValueError(f"motion = {about['motion']!r} is unknown")
     elif isinstance(table.get("motion"), dict) and table["motion"].get("file") is not None:
         raise InputError(f"motion.file = {table['motion']['file']!r}: a result opens no other file; {REMEDY}")
-    scene = scene_from_table(table, motion=motion)
+    table = table if motion is None else {name: part for name, part in table.items() if name != "motion"}
+    scene = scene_from_table(table, parts={} if motion is None else {"motion": motion})
     return replace(scene, fidelity=str(about["fidelity"])) if "fidelity" in about else scene
 
 

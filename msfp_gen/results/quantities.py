@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import singledispatch
 from typing import Any, Literal, NamedTuple
 
@@ -117,15 +117,20 @@ class Source(NamedTuple):
         quantity = self.quantity
         return not quantity.of_parts and (quantity.characterised or bool(quantity.governs))
 
-    def value(self, summary: Mapping[str, Any], characterisation: Any) -> Any:
+    def value(self, entry: Callable[[str], Any], characterisation: Any) -> Any:
         """The value of the quantity; None where the run has none.
 
+        entry: of the summary at a key, such as `result.entry`, which makes no other.
         characterisation: of the run; None where it is not needed, or not possible.
         """
         quantity = self.quantity
         if quantity.at_rest and not getattr(characterisation, "at_rest", False):
             return None
-        value = value_at(characterisation if quantity.characterised else summary, quantity.path)
+        if quantity.characterised:
+            value = value_at(characterisation, quantity.path)
+        else:
+            head = quantity.path.partition(".")[0]
+            value = value_at({head: entry(head)}, quantity.path)
         if self.place is None or value is None:
             return value
         return value[self.place] if self.place < len(value) else None

@@ -31,6 +31,7 @@ from msfp_gen.results.summary import (
     rows_of_bearing,
     summarise,
     summarise_gradients,
+    summary_of_bearing,
     surface_table,
     transition_table,
     work_rows,
@@ -119,6 +120,10 @@ class AnyResult(ABC):
     @abstractmethod
     def summary(self) -> dict[str, Any]:
         """Main results in SI units, as values that JSON can hold."""
+
+    def entry(self, key: str) -> Any:
+        """The entry of the summary at a key, without those that it does not need; None where there is none."""
+        return self.summary.get(key)
 
     @abstractmethod
     def characterise(self) -> Characterisation:
@@ -344,6 +349,17 @@ class Result(AnyResult):
     def summary(self) -> dict[str, Any]:
         """Main results of the run in SI units, as values that JSON can hold; `summary.summarise` lists the keys."""
         return summarise(self) | {"verdict": self.verdict.as_dict}
+
+    @cached_property
+    def of_bearing(self) -> dict[str, Any]:
+        """The part of the summary that all bearings have, without notes, verdict, energy and work of the solver."""
+        return summary_of_bearing(self)
+
+    def entry(self, key: str) -> Any:
+        """The entry of the summary at a key, without those that it does not need; None where there is none."""
+        if key == "verdict":
+            return self.verdict.as_dict
+        return self.of_bearing[key] if key in self.of_bearing else super().entry(key)
 
     def main_results(self) -> Rows:
         """Label and value of the main results."""

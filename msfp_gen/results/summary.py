@@ -142,12 +142,12 @@ def summarise(result: Result) -> dict[str, Any]:
     end [J].
     """
     if result.mounting is not None:
-        return {**result.mounting.summary, **summary_of_bearing(result)}
+        return {**result.mounting.summary, **result.of_bearing}
     counters = asdict(result.counters)
     wall_time = counters.pop("wall_time")
     return {
         **summary_of_run(result, result.history.time, counters, wall_time),
-        **summary_of_bearing(result),
+        **result.of_bearing,
         "energy": energy_balance(result.history),
     }
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -357,6 +357,7 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+WHOLE = ("building", "bearings")  # tables that a scene of a building reads together
 INTENSITY = "intensity"  # column of the intensity measure of [records]
 
 
@@ -393,7 +394,7 @@ def motion_of(record: Table) -> Table:
 class SceneFactory:
     """Makes the scenes of a study: writes the values of a run into the table of the base scene, and reads that table.
 
-    A motion that no axis changes is read once. The reader of scene files caches other motions and frames of buildings.
+    Tables that no axis changes are read once. The reader of scene files caches other motions and frames of buildings.
 
     Attributes:
         inputs: of the study.
@@ -414,12 +415,10 @@ class SceneFactory:
             for path in axis.paths
             if axis.change == "sets"
         )
-        self._fixed: Table = {}  # parts of every scene that are read already
-        if not inputs.records and "motion" not in self._changed:
-            self._fixed["motion"] = self.base.motion
-            if hasattr(self.base, "motion_table"):
-                self._fixed["motion_table"] = self.base.motion_table
-        self._table = {key: value for key, value in base.items() if key not in self._fixed}
+        self._table = base
+        self._parts = {
+            field.name: getattr(self.base, field.name) for field in fields(self.base) if field.name not in WHOLE
+        }
 
     def scene(self, values: Sequence[Any]) -> System:
         """The scene of a run. values: one for each axis, in the order of the axes. Raises InputError."""
@@ -434,7 +433,8 @@ class SceneFactory:
             for path in axis.paths if axis.change == "multiplies" else ():
                 table = multiplied_table(table, path, value, axis.surfaces)
         level: Any = table.get("fidelity", self._fidelity)
-        scene = scene_of({key: value for key, value in table.items() if key != "fidelity"}, **self._fixed)
+        other = {key: value for key, value in table.items() if value is not self._table.get(key) or key in WHOLE}
+        scene = scene_of({key: value for key, value in other.items() if key != "fidelity"}, parts=self._parts)
         for axis, value in pairs:
             if axis.change == "factors":
                 scene = scene_of_case(scene, self.inputs.factors[axis.paths[0]], value)

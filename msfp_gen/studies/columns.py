@@ -245,7 +245,7 @@ class _Reader:
     def value(self, name: str) -> Any:
         """The value of a quantity; None where the run has none."""
         source = self._known[name]
-        value = source.value(self.result.summary, self._characterisation if source.quantity.characterised else None)
+        value = source.value(self.result.entry, self._characterisation if source.quantity.characterised else None)
         if value is None and source.quantity.characterised and (why := source.reason(self._characterisation)):
             self.problem = f"no {name}: {why}"
         if name in TEXTS:

@@ -137,7 +137,7 @@ def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> 
     for column, source in sources.items():
         if source.quantity.characterised:
             continue
-        values = [plain_cell(source.value(row.summary, None)) for row in rows]
+        values = [plain_cell(source.value(row.summary.get, None)) for row in rows]
         if source.place is None or any(value is not None for value in values):
             table[column, source.quantity.unit] = values
     return write_columns(path, {**table, ("file", ""): [row.file for row in rows]}, name)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial, singledispatch
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -47,7 +48,8 @@ Table = dict[str, Any]
 MAX_DEPTH = 16  # of nested tables and lists; a scene has six
 _TOO_DEEP = "no valid TOML: tables or lists are nested too deeply; a scene needs few levels"
 _TOPS = {kind.kind: kind for kind in (RigTop, PrescribedTop, MassTop)}
-_ANY_MOTION: Table = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # valid, where a motion replaces it
+Parts = Mapping[str, Any]
+NO_PARTS: Parts = MappingProxyType({})
 _complete: InputCache[Table] = InputCache(16, lambda _: 1)
 _FIELDS_ALONE = {"solver": Solver, "initial_state": InitialState, "stop": Stop, "limits": Limits}
 
@@ -95,38 +97,33 @@ def toml_table(text: str) -> Table:
     return table
 
 
-def scene_from_table(
-    table: Mapping[str, Any],
-    folder: Path | None = None,
-    motion: Motion | None = None,
-    motion_table: Mapping[str, Any] | None = None,
-) -> Scene:
+def scene_from_table(table: Mapping[str, Any], folder: Path | None = None, parts: Parts = NO_PARTS) -> Scene:
     """The scene of a plain table, as in a scene file.
 
     folder: that of the scene file, to which paths in the table are relative; None: the working folder, and any path is
-    permitted. motion: replaces the `[motion]` table; motion_table: that from which it was made. Raises InputError.
+    permitted. parts: those of a scene by name that stand for tables which are left out. Raises InputError.
     """
-    parts, motion_keys = scene_parts(schema.SCENE, table, folder, motion)
+    parts = scene_parts(schema.SCENE, table, folder, parts)
     if parts.get("top_rotation") is not None and isinstance(parts.get("effects"), Effects):
         parts["effects"] = replace(parts["effects"], top_rotation=True)
     word = parts.pop("fidelity", "exact")
-    scene = Scene(**parts, motion_table=motion_keys if motion is None else motion_table)
-    reduced: Scene = at_fidelity(scene, word)
+    reduced: Scene = at_fidelity(Scene(**parts), word)
     return reduced
 
 
-def scene_parts(
-    model: schema.Model, table: Mapping[str, Any], folder: Path | None, motion: Motion | None
-) -> tuple[Table, Table]:
-    """The parts of a scene, of one bearing or of a building, by name, and its `[motion]` table with absolute paths.
+def scene_parts(model: schema.Model, table: Mapping[str, Any], folder: Path | None, others: Parts) -> Table:
+    """The parts of a scene, of one bearing or of a building, by name.
 
-    model: of its file. Other arguments and errors are those of `scene_from_table`. What is no part stays as validated.
+    model: of its file. others: those for which there are no tables. Other arguments and errors are those of
+    `scene_from_table`. What is no part stays as validated.
     """
-    valid = schema.validate(model, table if motion is None else {**table, "motion": _ANY_MOTION})
-    motion_keys = located(valid.pop("motion"), folder)
-    parts = {name: _PARTS[name](value) if name in _PARTS else value for name, value in valid.items()}
-    parts["motion"] = motion_from(motion_keys) if motion is None else motion
-    return parts, motion_keys
+    parts, valid = dict(others), schema.validate(schema.without(model, others.keys() - table.keys(), table), table)
+    if "motion" in valid:
+        keys = located(valid.pop("motion"), folder)
+        parts["motion"] = motion_from(keys)
+        if model is schema.SCENE:
+            parts["motion_table"] = keys
+    return parts | {name: _PARTS[name](value) if name in _PARTS else value for name, value in valid.items()}
 
 
 def bearing_from_table(table: Mapping[str, Any]) -> Bearing:

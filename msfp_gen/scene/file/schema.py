@@ -6,7 +6,7 @@ plain tables in SI units with only the keys that the file gives, or raise one In
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import MISSING
 from functools import lru_cache, partial, reduce
 from operator import or_
@@ -155,7 +155,8 @@ _REMEDIES = {"list_type": "give a list of tables", "literal_error": "give one of
 
 def validate_part(name: str, table: Mapping[str, Any]) -> Table:
     """The table `[bearing]`, `[top]` or `[solver]` alone, as of `validate`; raises InputError of one line."""
-    return validate(_ONLY[name], {name: table})[name]  # type: ignore[no-any-return]
+    others = SCENE.model_fields.keys() - {name}
+    return validate(without(SCENE, others, {name: table}), {name: table})[name]  # type: ignore[no-any-return]
 
 
 def validate_suite(table: Mapping[str, Any]) -> Table:
@@ -174,13 +175,17 @@ SUITE: Model = create_model(
 )
 
 
-def _only(name: str, kind: Any) -> Model:
-    """A table that holds one table."""
-    fields: Table = {name: (kind, ...)}
-    return create_model("Only", __base__=_Strict, **fields)
+def without(model: Model, others: Collection[str], table: Collection[str]) -> Model:
+    """The model of tables without some keys; the whole model, which refuses it, where the table has an unknown key."""
+    return _without(model, frozenset(others)) if others and model.model_fields.keys() >= set(table) else model
 
 
-_ONLY = {"bearing": _only("bearing", _EITHER), "top": _only("top", _TOP), "solver": _only("solver", PARTS["solver"])}
+@lru_cache(maxsize=64)
+def _without(model: Model, others: frozenset[str]) -> Model:
+    chosen: Table = {
+        name: (field.annotation, field) for name, field in model.model_fields.items() if name not in others
+    }
+    return create_model(model.__name__, __base__=_Strict, **chosen)
 
 
 def validate(model: Model, table: Mapping[str, Any]) -> Table:

@@ -9,7 +9,7 @@ from typing import Any
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.scene.file.changes import changed_table, keys_of
-from msfp_gen.scene.file.loader import scene_from_table, scene_table
+from msfp_gen.scene.file.loader import NO_PARTS, Parts, scene_from_table, scene_table
 from msfp_gen.scene.file.motion_tables import KINDS, paths_in, resolved, with_spectrum
 from msfp_gen.scene.file.schema import SCENE
 from msfp_gen.scene.scene import Scene
@@ -50,10 +50,10 @@ def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> Any:
         raise InputError(f"{path}: {error}") from None
 
 
-def scene_of(table: Mapping[str, Any], folder: Path | None = None, **parts: Any) -> System:
+def scene_of(table: Mapping[str, Any], folder: Path | None = None, parts: Parts = NO_PARTS) -> System:
     """The scene of a plain table, as in a file; folder, parts: as in `scene_from_table`. Raises InputError."""
     kind = kind_of(table)
-    return (scene_from_table if kind is None else kind.from_table)(table, folder, **parts)
+    return (scene_from_table if kind is None else kind.from_table)(table, folder, parts)
 
 
 def kind_of(table: Mapping[str, Any]) -> Kind | None:

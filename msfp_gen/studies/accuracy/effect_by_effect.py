@@ -157,7 +157,7 @@ def _run(system: System) -> tuple[Outcome, dict[str, Any]]:
     for column, source in quantities(system).items():
         if source.quantity.kept and source.quantity.side:
             name = column if source.place is None else column.rpartition("_")[0]
-            value = source.value(result.summary, None)
+            value = source.value(result.entry, None)
             columns.setdefault(name, []).append(nan if value is None else float(value))
     values = {name: np.array(each) for name, each in columns.items() if np.isfinite(each).any()}
     words = result.provenance.get("model", "").replace(", then ", "-").split("-")

@@ -74,7 +74,7 @@ class Case:
         """The value of a quantity [SI]; None where the run failed or the quantity is undefined."""
         if self.result is None or self.characterisation is None:
             return None
-        return source.value(self.result.summary, self.characterisation)  # type: ignore[no-any-return]
+        return source.value(self.result.entry, self.characterisation)  # type: ignore[no-any-return]
 
     def place(self, source: Source) -> str:
         """Where the value of a quantity is, and its share of what is allowed there; "" where it names no place."""

@@ -326,7 +326,7 @@ def test_every_quantity_of_the_catalogue_is_in_a_pushed():
     for run in (preset_run("fenz-test2"), pushed()):
         characterisation = replace(run.characterise(), envelope=cycles)  # the building moves for less than a cycle
         sources = quantities(run.scene)
-        values = {name: source.value(run.summary, characterisation) for name, source in sources.items()}
+        values = {name: source.value(run.entry, characterisation) for name, source in sources.items()}
         missing = {name.rstrip("_1234") for name, value in values.items() if value is None}
         # no friction law, no uplift; and both runs end in motion
         optional = {"least_friction", "most_friction", "peak_temperature", "maximum_uplift", "residual_displacement"}

@@ -64,3 +64,19 @@ def test_the_memory_is_not_read_for_few_rows(monkeypatch):
     monkeypatch.setattr(memory, "available", lambda: pytest.fail("the memory was read"))
     simulate(scene)
     simulate(replace(scene, output_step=0.01))
+
+
+def test_an_entry_of_the_summary_needs_no_other(asked, monkeypatch):
+    whole = simulate(scene_of("fenz-test2")).summary
+    asked.clear()
+    with monkeypatch.context() as patch:
+        patch.setattr("msfp_gen.results.result.verdict_of", lambda *_: pytest.fail("the verdict was made"))
+        result = simulate(scene_of("fenz-test2"))
+        for key in ("peak_displacement", "peak_force", "peak_sliding", "rims_met"):
+            assert result.entry(key) == whole[key]
+    assert asked == ["history_of"]
+    assert result.entry("verdict") == whole["verdict"]
+    assert {key: result.entry(key) for key in whole if "time" not in key} == {
+        key: value for key, value in whole.items() if "time" not in key
+    }
+    assert result.entry("none") is None
