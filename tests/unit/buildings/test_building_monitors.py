@@ -28,6 +28,7 @@ def same(one: BuildingResult, other: BuildingResult) -> bool:
     return rows and all(np.array_equal(*pair) for pair in peaks) and one.monitored == other.monitored
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unforeseen")
 def test_a_run_is_resumed_bit_by_bit_before_and_after_a_switch(tmp_path):
     scene = rocking(None)

@@ -240,6 +240,7 @@ def story() -> tuple[Push, dict[tuple[str, int], Any]]:
     return push, {(t.what, t.surface): t.at for t in closed_transitions(push, 0.14)}
 
 
+@pytest.mark.slow
 def test_stages_of_the_triple_pendulum_against_the_friction_circles() -> None:
     """Slopes of II, III and IV, and where they change: the closed form has no rounding and no weights."""
     first = preset_run("fenz-monotonic").characterise().first_loading

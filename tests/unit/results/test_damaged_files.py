@@ -50,6 +50,7 @@ def checked(found: dict[int, str]) -> Counter[str]:
     return counts
 
 
+@pytest.mark.slow
 def test_damage_ends_in_one_line(tmp_path: Path) -> None:
     assert checked(ends(bearing(tmp_path), 0, 16))["refused"] > 2
 

@@ -21,7 +21,7 @@ from msfp_gen.cli import main
 from msfp_gen.results.result import load_result
 from msfp_gen.scene.scene_fields import Stop
 
-COUNTS = [150, pytest.param(5000, marks=pytest.mark.slow)]
+COUNTS = [40, pytest.param(5000, marks=pytest.mark.slow)]
 
 
 @pytest.fixture(scope="module", params=["recipe", "pieces"])

@@ -48,7 +48,7 @@ SCENES = {
     "a stop": ("fenz-test5", {}, {}, {"stop": Stop(displacement=0.06)}),
 }
 FLIGHT = "bodies part, fly and land"
-OFTEN = ("even rows", "the report's method", "massless", FLIGHT)
+OFTEN = ("even rows", FLIGHT)
 
 
 @pytest.fixture(autouse=True)

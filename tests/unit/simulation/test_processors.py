@@ -14,6 +14,7 @@ from support.processors import inputs, rows, wide_features
 from msfp_gen.jit.compiler import x86_64_level
 
 
+@pytest.mark.slow
 def test_inputs_and_rows_do_not_depend_on_the_vectors_of_the_processor(tmp_path: Path) -> None:
     """NumPy without its versions for wide vectors, and BLAS as on a processor of 2013."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}

@@ -70,7 +70,7 @@ def scenes(draw: Any) -> Scene:
     return with_effects(scene, **draw(st.sampled_from([{}, WRONG])))
 
 
-@holds(60, 3000, scene=scenes())
+@holds(20, 3000, scene=scenes())
 def test_every_end_of_every_segment_is_a_result(scene: Scene) -> None:
     sequence, result = ended(scene)
     times = np.concatenate([part.model.unpack(part.run.rows)["time"] for part in sequence.segments])

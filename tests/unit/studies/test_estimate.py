@@ -288,6 +288,7 @@ def small_study(**changes):
     return {**table, "keep": ["peak_displacement", "peak_force", "minimum_gap"], **changes}
 
 
+@pytest.mark.slow
 def test_an_estimate_of_a_study_is_kept_and_continued(tmp_path):
     accuracy = {"quantity": "peak_displacement", "target": "80 %", "pilot": 16, "models": ["equivalent"]}
     table = small_study(accuracy=accuracy)

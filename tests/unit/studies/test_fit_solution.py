@@ -31,8 +31,8 @@ def process(correlation: float, rng: np.random.Generator) -> Array:
     ("correlations", "sizes"),
     [
         ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
-        ((0.0, 0.0, 0.0), (1.0, 2.0, 4.0)),
-        ((0.57, 0.57, 0.57), (1.0, 1.0, 1.0)),
+        pytest.param((0.0, 0.0, 0.0), (1.0, 2.0, 4.0), marks=pytest.mark.slow),
+        pytest.param((0.57, 0.57, 0.57), (1.0, 1.0, 1.0), marks=pytest.mark.slow),
         ((0.0, 0.57, 0.0), (1.0, 3.0, 1.0)),
     ],
     ids=["white", "noise by test", "correlated", "correlated in one test"],

@@ -104,6 +104,7 @@ def check(name: str, seeds: range, folder: Path) -> None:
                 assert found == tuple(summary[key]["radial"] for key in ("peak_displacement", "peak_force")), seed
 
 
+@pytest.mark.slow
 def test_studies_on_the_same_threads_are_their_runs(tmp_path: Path) -> None:
     check("threads", range(2), tmp_path)
 
@@ -135,6 +136,7 @@ def many() -> dict[str, Any]:
     return cheap_study(sampling={"samples": 50, "seed": 3}, chunk=2)
 
 
+@pytest.mark.slow
 def test_rows_of_dask_are_those_of_threads(cluster: Any, whole: pd.DataFrame, tmp_path: Path) -> None:
     assert msfp_gen.study(many(), tmp_path, dask=cluster.scheduler_address) == (100, 0, 100, 0)
     pd.testing.assert_frame_equal(rows_of(tmp_path), whole)
@@ -180,6 +182,7 @@ def test_rows_of_mpi_are_those_of_threads(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(rows_of(out), rows_of(whole))
 
 
+@pytest.mark.slow
 def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("msfp_gen.studies.batch.find_spec", lambda _: None)
     with pytest.raises(InputError, match="--dask needs distributed; pip install distributed"):

@@ -155,6 +155,7 @@ def test_ringing_that_is_not_resolved_in_time_is_stated_as_far_as_it_was(monkeyp
     assert any("not in the estimate" in row for row in found.tables[0].rows)
 
 
+@pytest.mark.slow
 def test_ringing_that_hardly_acts_is_in_the_estimate():
     found = simulate_within(load_scene("fenz-monotonic"), 0.005, explain=True)
     assert not found.left_out and truth(load_scene("fenz-monotonic"), found.chosen.rtol) <= found.estimate <= 0.005
@@ -356,6 +357,7 @@ def test_reference_runs_that_fail_end_the_search(monkeypatch):
         simulate_within(chosen(), 0.05)
 
 
+@pytest.mark.slow
 def test_effects_that_cannot_meet_the_target_are_given_up(monkeypatch):
     """Selected effects whose reference runs differ at any tolerance are replaced by all effects."""
     scene = replace(load_scene("fenz-test5"), effects=Auto(rims=None), output_step=None)
