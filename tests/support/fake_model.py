@@ -7,8 +7,10 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 from typing import TYPE_CHECKING
+
+from msfp_gen.generator import Generated
 
 if TYPE_CHECKING:
     import pytest
@@ -33,8 +35,8 @@ def sources(kernel: str = KERNEL, wrapper: str = WRAPPER) -> dict[str, str]:
     return {"msfp_model.h": HEADER, "msfp_kernels.c": kernel, "msfp_module.pyx": wrapper, "msfp_symbols.h": SYMBOLS}
 
 
-def generate(spec: object) -> SimpleNamespace:
-    return SimpleNamespace(files=sources(), statements=1, operations=1, stages=dict(STAGES))
+def generate(spec: object) -> Generated:
+    return Generated(files=sources(), statements=1, operations=1, stages=dict(STAGES))
 
 
 def generator(function=generate) -> ModuleType:

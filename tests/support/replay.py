@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -31,8 +31,9 @@ def inputs(scene: Scene) -> str:
         seen.extend([len(options["stops"]), options["stops"]])
         seen.extend([len(options["span_ends"]), options["span_ends"], options["span_steps"]])
 
-    fake: Any = SimpleNamespace(Stack=stack, Run=run)
-    start_run(scene, Model(model.spec, fake, model.info), scene.effect_selection, scene.end, None, ())
+    recorder: Any = ModuleType("recorder")
+    recorder.Stack, recorder.Run = stack, run
+    start_run(scene, Model(model.spec, recorder, model.info), scene.effect_selection, scene.end, None, ())
     words = [np.atleast_1d(np.asarray(value)).ravel() for value in seen]
     return "\n".join(
         " ".join(repr(x.item()) for x in row.astype(row.dtype if row.dtype != bool else int)) for row in words

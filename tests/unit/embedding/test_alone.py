@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import bearing_of, differences
+from support import bearing_of, differences, thinned
 from support.random_states import sensible
 
 from msfp_gen import Effects, InputError, Layout, symbolic
@@ -29,7 +29,7 @@ CASES = {
 }
 
 
-@pytest.fixture(scope="module", params=CASES)
+@pytest.fixture(scope="module", params=thinned(CASES, lambda name: name == "double"))
 def built(request, tmp_path_factory) -> tuple[Any, ModelSpec, Path]:
     """The module of a case, its model and its folder."""
     spec = ModelSpec(*CASES[request.param])

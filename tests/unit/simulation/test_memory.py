@@ -94,7 +94,6 @@ MEASURED = """
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from msfp_gen import Auto, load_scene, simulate
 from msfp_gen.simulation import memory
 

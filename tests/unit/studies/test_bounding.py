@@ -8,7 +8,6 @@ import json
 import re
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -31,6 +30,7 @@ from msfp_gen import (
     Top,
     changed_scene,
     load_scene,
+    presets,
     study,
 )
 from msfp_gen.cli import main
@@ -195,13 +195,12 @@ def test_scenes_have_their_properties_multiplied(tmp_path: Path) -> None:
 
 def test_a_second_coefficient_of_friction_goes_with_the_first() -> None:
     """Where every surface has it: a law that takes none leaves it out."""
-    changed: dict[str, Any] = {}
-    surfaces = [SimpleNamespace(friction=0.1, friction_slow=0.04), SimpleNamespace(friction=0.2, friction_slow=0.08)]
-    bearing: Any = SimpleNamespace(surfaces=surfaces, replace=lambda **given: changed.update(given) or bearing)
-    _scaled(bearing, "friction_slow", (0.5, 2.0))
-    assert changed == {"friction_slow": [0.02, 0.16]}
-    surfaces[1].friction_slow, plain = None, dict(changed)
-    assert _scaled(bearing, "friction_slow", (0.1, 0.1)) is bearing and changed == plain
+    bearing = presets.bearing("double-fp").replace(friction=[0.1, 0.2], friction_slow=[0.04, 0.08])
+    scaled = _scaled(bearing, "friction_slow", (0.5, 2.0))
+    assert [surface.friction_slow for surface in scaled.surfaces] == [0.02, 0.16]
+    first, second = bearing.surfaces
+    one = dataclasses.replace(bearing, surfaces=[first, dataclasses.replace(second, friction_slow=None)])
+    assert _scaled(one, "friction_slow", (0.1, 0.1)) is one
 
 
 @cache

@@ -34,6 +34,7 @@ def outcome(values, **limits):
     return Outcome({"a": np.array(values)}, readings, 1.0)
 
 
+@pytest.mark.slow
 def test_changes_are_differences_of_runs():
     study = effect_by_effect(SCENE, only=("sliders",))
     rows = {one.effect: one for one in study.changes}
