@@ -35,7 +35,8 @@ def test_auto_keeps_its_promise(kind: str, number: int) -> None:
         assert found.kept, (found.difference, found.floor)
 
 
-@pytest.mark.parametrize("number", thinned(range(16), lambda number: number == 10))
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(16))
 def test_auto_follows_sliders_on_their_edges(number: int) -> None:
     """Within the promise; where the stack comes apart it does so at the same time."""
     scene = auto_scenes.on_edge(auto.SEED, number)

@@ -31,10 +31,10 @@ def test_catalogue_is_complete_and_described():
     assert all(line and "\n" not in line for line in presets.names().values())
 
 
-@pytest.mark.parametrize("name", presets.names("scene"))
-def test_every_scene_loads_under_its_name(name):
-    scene = presets.scene(name)
-    assert scene.name == name and scene == load_scene(name)
+def test_every_scene_loads_under_its_name():
+    for name in presets.names("scene"):
+        scene = presets.scene(name)
+        assert scene.name == name and scene == load_scene(name)
 
 
 # Tables A.1-A.8, typed here once more from the report: R, s_c, mu; l, z, m, J, r, p.
@@ -88,13 +88,12 @@ def test_scenes_of_the_report_have_no_contact_damping_and_scenes_of_ones_own_hav
     assert {surface.contact_damping for surface in own.bearing.surfaces} == {1e-4}
 
 
-@pytest.mark.parametrize("name", TABLES)
-def test_rim_offsets_are_the_sagitta_of_the_convex_face(name):
-    # The report gives p to two digits and never says what it is; this ties it to R and r of the same table.
-    bearing = presets.bearing(name)
-    for surface in (0, 1):
-        R, body = bearing.surfaces[surface].radius, bearing.bodies[surface]
-        assert body.rim_offset == pytest.approx(R - np.sqrt(R**2 - body.rim_radius**2), rel=0.02)
+def test_rim_offsets_are_the_sagitta_of_the_convex_face():
+    for name in TABLES:
+        bearing = presets.bearing(name)
+        for surface in (0, 1):
+            R, body = bearing.surfaces[surface].radius, bearing.bodies[surface]
+            assert body.rim_offset == pytest.approx(R - np.sqrt(R**2 - body.rim_radius**2), rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -126,16 +125,16 @@ def test_unusual_bearing_differs_in_friction_alone():
     assert scene.motion == Motion.harmonic(0.14, 0.02)
 
 
-@pytest.mark.parametrize("mm", ORBITS)
-def test_orbits_after_the_lead_in(mm):
-    t, A = 20 + np.linspace(0, 4 * pi / 0.1, 50), mm / 1000
-    expected = {"circle": np.sin(0.1 * t), "eight": np.sin(0.2 * t)}
-    for shape, second in expected.items():
-        scene = presets.scene(f"becker-{shape}-{mm}")
-        found = scene.motion.displacement(np.minimum(t, scene.end))
-        np.testing.assert_allclose(found, A * np.stack([np.cos(0.1 * t), second, 0 * t], -1), atol=1e-6 * A)
-        assert scene.bearing == presets.bearing("becker-tfp").replace(contact_damping=0.0) and scene.top == RIG
-        assert scene.end == pytest.approx(20 + 4 * pi / 0.1)
+def test_orbits_after_the_lead_in():
+    for mm in ORBITS:
+        t, A = 20 + np.linspace(0, 4 * pi / 0.1, 50), mm / 1000
+        expected = {"circle": np.sin(0.1 * t), "eight": np.sin(0.2 * t)}
+        for shape, second in expected.items():
+            scene = presets.scene(f"becker-{shape}-{mm}")
+            found = scene.motion.displacement(np.minimum(t, scene.end))
+            np.testing.assert_allclose(found, A * np.stack([np.cos(0.1 * t), second, 0 * t], -1), atol=1e-6 * A)
+            assert scene.bearing == presets.bearing("becker-tfp").replace(contact_damping=0.0) and scene.top == RIG
+            assert scene.end == pytest.approx(20 + 4 * pi / 0.1)
 
 
 @pytest.mark.parametrize("station", ["ccc", "clc"])
