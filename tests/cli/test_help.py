@@ -109,6 +109,7 @@ def test_nothing_is_said_of_a_model_that_is_there(capsys):
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_spectra_scales_and_reports_say_how_far_they_are():
     """What takes seconds is told: every period, every figure, in order to the end."""
     record = bundled("ridgecrest-2019-ci-clc")

@@ -35,6 +35,7 @@ def test_no_motion_at_all(dimension: str) -> None:
     assert run.summary["energy"]["closure_error"] is None
 
 
+@pytest.mark.slow
 def test_a_millihertz() -> None:
     """A period of a thousand seconds takes no more steps than one of ten."""
     slow, fast = (shaken(triple(), Motion.harmonic(0.1, f, cycles=0.75), 0.01 / f) for f in (1e-3, 1e-1))

@@ -136,6 +136,7 @@ def test_any_load_follows_the_reference(load: float) -> None:
     assert run.history.normal_force.min() > 0
 
 
+@pytest.mark.slow
 def test_no_load_at_all_is_the_weight_of_the_top_plate() -> None:
     """N = 0 on a plate whose centre of mass is at its top is a load of its weight on a plate that weighs nothing."""
     bearing = a_stack(TFP, RADII, **USUAL)

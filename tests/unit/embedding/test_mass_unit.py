@@ -16,6 +16,7 @@ from msfp_gen.embedding.unit import scene_of_unit, write_fmu
 from msfp_gen.model.model import build_model
 
 pytest.importorskip("fmpy")
+pytestmark = pytest.mark.slow  # a second unit, compiled for twenty seconds; that of a rig is built every time
 
 STEP, COUNT = 0.02, 60
 BASE = np.zeros((2, 6))

@@ -72,6 +72,7 @@ def _python_path() -> str:
     return os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
 
 
+@pytest.mark.slow
 @needs_zig
 def test_the_doctor_finds_it_and_builds_with_it(tmp_path: Path) -> None:
     done = without_cc(tmp_path, "doctor")

@@ -38,7 +38,9 @@ def close(found: Any, want: Any) -> bool:
 
 
 @pytest.mark.parametrize("met", [False, True], ids=("clear", "at the rims"))
-@pytest.mark.parametrize("layout", [(3, 1, 1), (5, 2, 2), pytest.param((6, 3, 2), marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "layout", thinned([((3, 1, 1),), ((5, 2, 2),), ((6, 3, 2),)], lambda layout: layout == (3, 1, 1))
+)
 def test_equations_in_sympy_are_those_of_the_compiled_model(layout, met):
     count = layout[0] - 1
     begin = time.process_time()
@@ -244,6 +246,7 @@ def small_oscillations(bearing, top):
     return mass, weights, turn.T @ np.diag(spring) @ turn
 
 
+@pytest.mark.slow
 def test_example_derives_stiffness_and_frequencies(capsys):
     import matplotlib as mpl
 
