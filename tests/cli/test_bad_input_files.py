@@ -171,10 +171,6 @@ def run_refused(folder: Path, text: str, capsys: pytest.CaptureFixture[str]) -> 
         return refused(capsys, "run", "scene.toml", "-o", "out.nc", "--plot", "out.png")
 
 
-def test_there_are_more_than_a_hundred() -> None:
-    assert len(malformed_scenes.ROWS) + len(SCENES) + len(FILES) + len(LAYOUTS) >= 150
-
-
 @pytest.mark.parametrize("case", SCENES)
 def test_scene_files(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text, words = SCENES[case]

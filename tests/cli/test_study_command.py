@@ -62,7 +62,7 @@ def test_a_study_runs_continues_and_says_how_far_it_is(tmp_path: Any, capsys: py
     assert (found["done"], found["failed"], found["running"], found["chunks"]) == (12, 0, False, 3)
 
 
-def test_an_estimate_is_ten_lines(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_estimate_is_printed_and_kept_as_json(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = (
         written(tmp_path, scene=planar(tmp_path), accuracy={"models": ["massless"], "pilot": 16}),
         tmp_path / "out",
@@ -70,7 +70,7 @@ def test_an_estimate_is_ten_lines(tmp_path: Any, capsys: pytest.CaptureFixture[s
     arguments = ["study", str(path), "-o", str(out), "--threads", "--workers", "1", "--target", "20%"]
     assert main([*arguments, "--estimate", "peak_force"]) == 0
     shown = capsys.readouterr().out.splitlines()
-    assert len(shown) <= 10 and "mean of peak_force" in shown[0]
+    assert "mean of peak_force" in shown[0]
     assert main([*arguments, "--estimate", "peak_force", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["runs"]["exact"] >= 16
     share = [*arguments, "--estimate", "peak_force", "--statistic", "probability", "--threshold", "1e3"]

@@ -24,11 +24,6 @@ def page() -> dict[str, Any]:
     return space
 
 
-def test_the_midpoint_rule_is_sixteen_lines():
-    block = re.search(r"^def midpoint\(.*?^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)[0]
-    assert len(block.splitlines()) - 1 <= 18
-
-
 def test_methods_tend_to_what_simulate_gives(page):
     scene = Scene(
         bearing=page["bearing"],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 import time
 from dataclasses import replace
@@ -17,35 +16,6 @@ from msfp_gen import Effects, Layout, Motion, Top, load_scene, presets, simulate
 PATH = ROOT / "examples" / "reference_loop.py"
 sys.path.append(str(PATH.parent))
 import reference_loop as loop  # noqa: E402
-
-
-def test_it_is_short_and_stands_alone_before_its_last_section():
-    text = PATH.read_text(encoding="utf-8")
-    assert text.count("\n") <= 200
-    alone, _, _ = text.partition("\n# ---- ")
-    assert set(re.findall(r"^ *(?:from|import) (\w+)", alone, re.MULTILINE)) == {
-        "dataclasses",
-        "fractions",
-        "functools",
-        "types",
-        "numpy",
-    }
-    for number in (
-        "2.36",
-        "2.118",
-        "2.119",
-        "3.12",
-        "3.13",
-        "3.17",
-        "3.18",
-        "3.19",
-        "3.21",
-        "3.23",
-        "3.25",
-        "3.28",
-        "3.29",
-    ):
-        assert number in alone
 
 
 def difference(scene, end, step, capsys):

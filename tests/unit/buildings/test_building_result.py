@@ -40,9 +40,9 @@ def test_the_note_of_a_cheaper_model_is_read_from_the_file(tmp_path: Path):
     assert read.notes == run.notes and read.scene.fidelity == "rigid"
 
 
-def test_few_lines():
+def test_a_result_prints_its_main_values():
     lines = repr(pushed()).splitlines()
-    assert len(lines) <= 11 and lines[0] == "Result of frame" and "status" in lines[1]
+    assert lines[0] == "Result of frame" and "status" in lines[1]
     assert any("at centres of mass" in line and "at corners" in line for line in lines)
     assert lines[2] == "  verdict           within the limits of the device"
     steps = pushed().counters["steps"]
@@ -50,7 +50,7 @@ def test_few_lines():
     html = pushed()._repr_html_()
     assert "<polyline" in html and "orbit of bearing" in html and "base shear" in html
     lines = repr(pushed().bearings[1]).splitlines()
-    assert len(lines) <= 10 and lines[0] == "Result of bearing 2 (B) of frame" and "5_2_2 at (-3, 2) m" in lines[3]
+    assert lines[0] == "Result of bearing 2 (B) of frame" and "5_2_2 at (-3, 2) m" in lines[3]
     assert "<polyline" in pushed().bearings[1]._repr_html_()
     assert all(table.text for run in (pushed(), pushed().bearings[1]) for table in run.tables())
 
