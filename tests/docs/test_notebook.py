@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from support import ROOT, thinned
+from support import ROOT
 
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 CELL = {"markdown": {"cell_type", "id", "metadata", "source"}}
@@ -53,7 +53,8 @@ def test_it_is_of_format_4_and_holds_no_output(path):
     assert path.stat().st_size < 20e3 and "tests/docs/test_notebook.py" in sources(path, "markdown")[0]
 
 
-@pytest.mark.parametrize("path", thinned(NOTEBOOKS, lambda path: path.stem == "earthquake"), ids=lambda path: path.stem)
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_every_cell_runs(path, tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "agg")
     code = sources(path)

@@ -24,6 +24,7 @@ def page() -> dict[str, Any]:
     return space
 
 
+@pytest.mark.slow
 def test_methods_tend_to_what_simulate_gives(page):
     scene = Scene(
         bearing=page["bearing"],

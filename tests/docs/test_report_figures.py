@@ -24,6 +24,7 @@ def run(name: str) -> Result:
     return report_figures.run(name)
 
 
+@pytest.mark.slow
 def test_stages_and_orbits_are_drawn(tmp_path):
     report_figures.stages(run, tmp_path / "stages.png")
     report_figures.orbits(run, tmp_path / "circle.png", kind="circle")
