@@ -21,7 +21,6 @@ from msfp_gen import RunError, Scene
 from msfp_gen.common.output import replacing
 from msfp_gen.common.tables import markdown_table, write_rows
 from msfp_gen.studies.accuracy import model_errors, simulate_within, work_precision
-from msfp_gen.studies.accuracy.error_target import largest_error
 from msfp_gen.studies.accuracy.study import Point, Study, draw, machine, reference_text, without_stop
 from msfp_gen.studies.accuracy.study import rows as rows_of
 from msfp_gen.studies.accuracy.timed_run import errors, run_native
@@ -156,9 +155,9 @@ def model_table(study: Study) -> str:
             continue
         last = finished[-1].errors
         assert last is not None
-        sliding = "-" if last.sliding_rms != last.sliding_rms else percent(last.sliding_rms)
+        sliding = "-" if last["sliding"].rms != last["sliding"].rms else percent(last["sliding"].rms)
         cost = at.get(series, finished[0]).trial.seconds / at["as it stands"].trial.seconds
-        rows.append((series, percent(last.force_rms), percent(last.force_peak), sliding, f"{cost:.2g}"))
+        rows.append((series, percent(last["force"].rms), percent(last["force"].peak), sliding, f"{cost:.2g}"))
     return markdown_table(("model", "force RMS", "peak force", "sliding RMS", "time over the full one"), rows)
 
 
@@ -193,7 +192,7 @@ def peer_method_section(share: float) -> dict[str, str]:
     rows = []
     for point in study.points:
         trial, found = point.trial, point.errors
-        shown = ("-", "-") if found is None else (percent(found.force_max), percent(found.worst_rms))
+        shown = ("-", "-") if found is None else (percent(found["force"].max), percent(found.worst_rms))
         outcome = "success, **wrong**" if point.wrong else "success" if trial.finished else "cut off"
         rows.append(
             (
@@ -237,10 +236,10 @@ def ringing_table(share: float) -> str:
                     seconds(run.seconds),
                     f"{tight:g}",
                     seconds(resolved.expected_seconds),
-                    percent(found.force_rms),
-                    percent(found.force_max),
-                    percent(found.force_peak),
-                    percent(found.sliding_rms),
+                    percent(found["force"].rms),
+                    percent(found["force"].max),
+                    percent(found["force"].peak),
+                    percent(found["sliding"].rms),
                 )
             )
     return markdown_table(
@@ -279,7 +278,7 @@ def estimate_table() -> str:
                     percent(target),
                     f"{found.chosen.rtol:g}",
                     percent(found.chosen.estimate),
-                    percent(largest_error(difference)),
+                    percent(difference.largest),
                     seconds(found.chosen.seconds),
                 )
             )

@@ -412,7 +412,8 @@ def opensees_triple(scenes: Sequence[Scene], steps: int) -> Iterator[Series]:
     for scene in scenes:
         theirs = run_opensees(scene, steps)
         assert theirs.status == "ok", theirs.message
-        at, pick = comparison_times(scene.end), slice(len(theirs.force) // 24, None, len(theirs.force) // 24)
+        forces = theirs.histories["force"][:, 0]
+        at, pick = comparison_times(scene.end), slice(len(forces) // 24, None, len(forces) // 24)
         friction = [surface.friction for surface in scene.bearing.surfaces]
         pivot = scene.bearing.replace(friction=friction, friction_at="pivot")
         equal = pivot.replace(yield_displacement=shared_yield(scene.bearing))
@@ -420,9 +421,9 @@ def opensees_triple(scenes: Sequence[Scene], steps: int) -> Iterator[Series]:
             history = simulate(replace(scene, bearing=bearing, output_step=float(at[1]))).history
             for axis in range(2):
                 ours = history.top_force[: len(at), axis]
-                if not np.any(theirs.force[:, axis]):
+                if not np.any(forces[:, axis]):
                     continue
-                rows = zip(at[pick], theirs.force[pick, axis], ours[pick], strict=True)
+                rows = zip(at[pick], forces[pick, axis], ours[pick], strict=True)
                 points = [Point(f"{t:.3f} s", float(one), float(two)) for t, one, two in rows]
                 yield Series(scene.name, source + suffix, "program", f"force along E{axis + 1} [N]", points)
 

@@ -28,7 +28,7 @@ from msfp_gen.scene.effect_selection import load_at_rest
 from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.studies.accuracy.error_target import simulate_within
-from msfp_gen.studies.accuracy.timed_run import Errors, Trial, errors, largest_error, run_native
+from msfp_gen.studies.accuracy.timed_run import Errors, Trial, errors, run_native
 
 TARGET = 0.005
 TIGHT = 1e-6  # tolerance of the reference run, or a tenth of that of the run, if this is less
@@ -67,7 +67,7 @@ class Promise:
     @property
     def kept(self) -> bool:
         """Whether the true error is at most the stated one, or not known better than to the floor."""
-        return self.stated is None or largest_error(self.true) <= max(self.stated, self.floor)
+        return self.stated is None or self.true.largest <= max(self.stated, self.floor)
 
 
 def scenes() -> Iterator[tuple[str, Scene]]:
@@ -134,7 +134,7 @@ def promise(name: str, scene: Scene, target: float = TARGET, budget: float = 60.
         name=name,
         stated=found.estimate,
         true=true,
-        floor=float("nan") if between is None else largest_error(between),
+        floor=float("nan") if between is None else between.largest,
         tolerance=found.chosen.rtol,
         left_out="ringing" if found.left_out else "-",
         models=tuple(found.result.provenance["model"].split(", then ")),
@@ -150,7 +150,7 @@ def rows(scenes: Iterable[tuple[str, Scene]], tight: float = TIGHT) -> Iterator[
         except RunError as error:
             yield f"| {name} | - | - | - | - | - | {str(error).split(';')[0]} |"
             continue
-        peaks = max(found.true.force_peak, found.true.sliding_peak)
+        peaks = max(found.true["force"].peak, found.true["sliding"].peak)
         stated = "not known" if found.stated is None else f"{100 * found.stated:.3f} %"
         percents = " | ".join(f"{100 * value:.3f} %" for value in (found.true.worst_rms, peaks, found.floor))
         mark = "" if found.kept else " **missed**"
@@ -213,10 +213,11 @@ class Outcome:
 def share_of_friction(scene: Scene, run: Trial, reference: Trial) -> float:
     """Largest difference in the units of the promise of `Auto`: force over friction, sliding over the largest one [-]."""
     friction = max(surface.friction for surface in scene.bearing.surfaces) * load_at_rest(scene)
-    rows, slid = min(len(run.force), len(reference.force)), float(reference.sliding.max())
-    away = np.linalg.norm(run.force[:rows] - reference.force[:rows], axis=1)
-    one, two = (float(np.linalg.norm(trial.force, axis=1).max()) for trial in (run, reference))
-    slides = float(np.abs(run.sliding.max(axis=0) - reference.sliding.max(axis=0)).max())
+    rows, slid = min(run.rows, reference.rows), float(reference.histories["sliding"].max())
+    force, exact = (trial.histories["force"][:, 0] for trial in (run, reference))
+    away = np.linalg.norm(force[:rows] - exact[:rows], axis=1)
+    one, two = (float(np.linalg.norm(each, axis=1).max()) for each in (force, exact))
+    slides = float(np.abs(run.histories["sliding"].max(axis=0) - reference.histories["sliding"].max(axis=0)).max())
     return max(float(np.sqrt(np.mean(away**2))) / friction, abs(one - two) / friction, slides / slid)
 
 
@@ -231,7 +232,7 @@ def outcome(number: int, seed: int = SEED) -> Outcome:
     between = errors(second, reference) if second.finished else None
     floors = (float("nan"),) * 2
     if between is not None:
-        floors = largest_error(between), share_of_friction(scene, second, reference)
+        floors = between.largest, share_of_friction(scene, second, reference)
     ended = simulate(replace(scene, output_step=scene.end / 2000))
     default = run_native("implicit", scene, scene.solver.rtol, LIMITS[0], 0)
     kinds = tuple(dict.fromkeys(note.kind for note in ended.notes if note.kind != "value"))
@@ -241,7 +242,7 @@ def outcome(number: int, seed: int = SEED) -> Outcome:
     except RunError as error:
         return replace(found, unreached=error.status)
     true = errors(run_native("implicit", within.result.scene, within.chosen.rtol, LIMITS[0], 0), reference)
-    return replace(found, stated=within.estimate, true=None if true is None else largest_error(true))
+    return replace(found, stated=within.estimate, true=None if true is None else true.largest)
 
 
 def campaign(numbers: Iterable[int], workers: int, seed: int) -> Iterator[str]:
@@ -286,9 +287,9 @@ def vibrations(numbers: Iterable[int], seed: int) -> Iterator[str]:
         true = errors(run_native("implicit", scene, scene.solver.rtol, LIMITS[0], 0), reference)
         noted = [note.value for note in simulate(scene).notes if note.kind == "vibration"]
         elastic = max(surface.yield_displacement for surface in scene.bearing.surfaces)
-        error = "-" if true is None else f"{100 * true.force_rms:.3f} %"
+        error = "-" if true is None else f"{100 * true['force'].rms:.3f} %"
         estimate = f"{100 * noted[0]:.2g} %" if noted else "no note"
-        yield f"| {scene.name} | {error} | {estimate} | {float(reference.sliding.max()) / elastic:.2g} |"
+        yield f"| {scene.name} | {error} | {estimate} | {float(reference.histories['sliding'].max()) / elastic:.2g} |"
 
 
 def main() -> None:

@@ -100,10 +100,10 @@ def against_opensees() -> None:
     text = f"becker-eight-125, RMS force error < 2e-3: implicit {rtol:g} {1e3 * ours:.2f} ms ({error:.1e})"
     if not installed("openseespy.opensees", f"OpenSees beside {text}"):
         return
-    limit = run_opensees(scene, pick(64_000, 16_000)).force
+    limit = run_opensees(scene, pick(64_000, 16_000)).histories["force"][:, 0]
     for steps in (500, 1000, 1500, 2000, 3000, 4000, 8000, 16_000):
         begin = time.process_time()
-        force = run_opensees(scene, steps).force
+        force = run_opensees(scene, steps).histories["force"][:, 0]
         seconds = time.process_time() - begin
         theirs = difference(force, limit)[0]
         if theirs < 2e-3:

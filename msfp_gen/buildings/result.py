@@ -189,6 +189,28 @@ class BuildingResult(AnyResult):
         values: Array = np.einsum("sin,kn->ksi", rows, motion)
         return values
 
+    @property
+    def work(self) -> Mapping[str, float]:
+        """Counters of the work of the solver, and wall_time [s]."""
+        return {**self.counters, "wall_time": self.wall_time}
+
+    @property
+    def compared(self) -> dict[str, Array]:
+        """Horizontal histories by which runs are compared: quantity -> ndarray, shape (k, places, 2) [SI].
+
+        Displacement of the bearings, base shear, accelerations of the nodes (of floors at their centres of mass), and
+        drifts of the storeys at their stiffness centres.
+        """
+        nodes = [node.rows[:2] for node in self.scene.building.nodes]
+        floors = np.einsum("fin,kn->kfi", np.array(nodes), self.acceleration)
+        storeys = {"drift": self.drift[:, :, :2]} if self.scene.building.columns else {}
+        return {
+            "bearing_displacement": self.bearing_displacement[:, :, :2],
+            "base_shear": self.base_reaction[:, None, :2],
+            "floor_acceleration": floors,
+            **storeys,
+        }
+
     @cached_property
     def energy_error(self) -> tuple[float, int]:
         """Largest error of the energy balance over the largest energy [-], and its row.

@@ -7,13 +7,13 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import reduce
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
 from msfp_gen.buildings.extremes import BuildingExtremes, lift_of, padded, temperature_of, vectors
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.buildings.scene import Asked, BuildingScene
 from msfp_gen.buildings.spectra import Steps
 from msfp_gen.buildings.storey import FREEDOMS
 from msfp_gen.common.arrays import Array, parts
@@ -28,7 +28,6 @@ from msfp_gen.motions.time_grid import TimeGrid, snapped
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.scene.effect_switching import Ending, monitor_options, next_effects, stopping_monitors
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.solver import Solver
 from msfp_gen.simulation.outcome import provenance_of, stopped
 from msfp_gen.simulation.start import RestartState, transferred_heights, transferred_state
 from msfp_gen.specification.contract import WORKS, names
@@ -68,14 +67,6 @@ def earlier_work(changes: Sequence[Change], bearing: int, shape: tuple[int, ...]
 OF_SURFACES = ("normal", "sliding", "rim", "compression", "temperature")  # of a row; not every model has the last two
 STORED = ("kinetic", "potential", "restraint", "rim_stored", "seat_stored")
 KEPT = (*OF_SURFACES, *STORED, "work")
-
-
-class Asked(NamedTuple):
-    """The input that decides the effects of a bearing: see `effect_switching.Requested`."""
-
-    effects: Effects | Auto
-    solver: Solver
-    end: float
 
 
 @dataclass(frozen=True, eq=False)

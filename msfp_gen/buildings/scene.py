@@ -24,6 +24,7 @@ from msfp_gen.results.quantities import Source
 from msfp_gen.results.variables import Places
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
+from msfp_gen.scene.effect_switching import with_monitored
 from msfp_gen.scene.friction_parameters import bearing_for, select_friction
 from msfp_gen.scene.scene_fields import Fidelity, Limits
 from msfp_gen.scene.solver import Solver
@@ -89,6 +90,14 @@ def standing_below(mount: BuildingBearing, load: float) -> tuple[float, float, f
     """
     weight = float(load)
     return mount.interface.rotational_stiffness, needed_rotational_stiffness(mount.bearing, weight, 0.0), weight
+
+
+class Asked(NamedTuple):
+    """The input that decides the effects of a bearing: see `effect_switching.Requested`."""
+
+    effects: Effects | Auto
+    solver: Solver
+    end: float
 
 
 class VerticalModes(NamedTuple):
@@ -365,6 +374,23 @@ class BuildingScene(OtherSystem):
             for mount in self.bearings
         ]
         return replace(self, bearings=bearings)
+
+    def with_all_effects(self) -> Self:
+        """The scene with every effect that monitors may add to its bearings; those with given effects stay."""
+        bearings = []
+        for mount, effects in zip(self.bearings, self.modelled, strict=True):
+            requested = Asked(Auto() if mount.effects is None else mount.effects, self.solver, self.end)
+            bearings.append(replace(mount, effects=with_monitored(requested, effects)))
+        return (
+            self
+            if all(isinstance(mount.effects, Effects) for mount in self.bearings)
+            else replace(self, bearings=bearings)
+        )
+
+    @property
+    def loads_at_rest(self) -> tuple[float, ...]:
+        """Axial load of every bearing at rest [N]."""
+        return tuple(self.axial_loads.tolist())
 
     def beginning_like(self, others: Sequence[Self]) -> Self:
         """The scene with uplift from the start in the bearings that have it in any of `others`."""

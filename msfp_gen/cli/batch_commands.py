@@ -31,7 +31,7 @@ from msfp_gen.common.output import check_output, make_folder
 from msfp_gen.common.tables import TABLE_SUFFIXES
 
 if TYPE_CHECKING:
-    from msfp_gen.scene.scene import Scene
+    from msfp_gen.scene.system import System
     from msfp_gen.studies.accuracy.study import Study
     from msfp_gen.studies.sweep import Row, Variation
 
@@ -209,14 +209,14 @@ def model_error(
 
 
 def _report(
-    name: str, duration: float | None, folder: Path | None, as_json: bool, study: Callable[[Scene], Study]
+    name: str, duration: float | None, folder: Path | None, as_json: bool, study: Callable[[System], Study]
 ) -> None:
     """Load the scene, run the study, print it and write its files."""
     from msfp_gen.common.output import make_folder
-    from msfp_gen.scene.file.source import load_bearing_scene
+    from msfp_gen.scene.file.source import load_scene
     from msfp_gen.studies.accuracy.study import as_dict, tables, write
 
-    scene = load_bearing_scene(name)
+    scene = load_scene(name)
     if duration is not None:
         scene = replace(scene, duration=duration)
     if folder is not None:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 
-from msfp_gen.common.errors import InputError, RunError, printable
+from msfp_gen.common.errors import RunError, printable
 from msfp_gen.common.fields import Choice, Rule, ruled_fields
 from msfp_gen.results.sign import SIGNS
 from msfp_gen.specification.layout import Effects
@@ -263,16 +263,6 @@ def is_result(loaded: object) -> bool:
     from msfp_gen.results.result import AnyResult
 
     return isinstance(loaded, AnyResult)
-
-
-def one_bearing(loaded: Any, what: str) -> Any:
-    """A scene or result of one bearing. Raises InputError that begins with `what` for another system."""
-    from msfp_gen.results.result import Result
-    from msfp_gen.scene.scene import Scene
-
-    if not isinstance(loaded, Scene | Result):
-        raise InputError(f"{what}: this has more than one bearing; leave it out, or give one bearing alone")
-    return loaded
 
 
 def build(scene: System, gradients: bool = False) -> None:

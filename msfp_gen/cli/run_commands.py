@@ -21,7 +21,6 @@ from msfp_gen.cli.console import (
     note_exceeded,
     note_written,
     number,
-    one_bearing,
     parser_of,
     run_scene,
     say,
@@ -34,7 +33,6 @@ from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
     from msfp_gen.results.result import AnyResult
-    from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.system import System
     from msfp_gen.studies.accuracy.error_target import Within
 
@@ -157,12 +155,11 @@ class ErrorTarget:
         check_target(target.error, target.budget)
         return target
 
-    def simulate(self, scene: Scene) -> Within:
+    def simulate(self, scene: System) -> Within:
         """Run the scene to the requested error."""
         from msfp_gen.studies.accuracy import simulate_within
-        from msfp_gen.studies.accuracy.error_target import with_all_effects
 
-        for needed in (scene, with_all_effects(scene)):  # of the run, and of its reference run
+        for needed in (scene, scene.with_all_effects()):  # of the run, and of its reference run
             build(needed)
         with Progress(scene.name or "run") as progress:
             return simulate_within(scene, self.error, budget=self.budget, explain=self.explain, progress=progress)
@@ -264,7 +261,7 @@ def _run(
     strict: bool = False,
 ) -> list[Path]:
     """Simulate, print and save; returns the paths. A failed run is printed and saved before its error is raised."""
-    within = None if target is None else target.simulate(one_bearing(scene, f"--error = {target.error:g}"))
+    within = None if target is None else target.simulate(scene)
     options = {"strict": strict} | checkpoints.arguments
     with checkpoints.hint_on_write_error():
         result, failure = run_scene(scene, **options) if within is None else (within.result, None)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -88,6 +88,10 @@ class AnyResult(ABC):
         def notes(self) -> tuple[Note, ...]:
             """Messages of the monitors."""
 
+        @property
+        def time(self) -> Array:
+            """Times of the rows."""
+
     @cached_property
     def dataset(self) -> xr.Dataset:
         """Rows, and events, as an xarray.Dataset, with units, meanings and signs in attributes; built at first use."""
@@ -124,6 +128,16 @@ class AnyResult(ABC):
     def entry(self, key: str) -> Any:
         """The entry of the summary at a key, without those that it does not need; None where there is none."""
         return self.summary.get(key)
+
+    @property
+    @abstractmethod
+    def work(self) -> Mapping[str, float]:
+        """Counters of the work of the solver, and wall_time [s]."""
+
+    @property
+    @abstractmethod
+    def compared(self) -> dict[str, Array]:
+        """The histories by which runs are compared: quantity -> ndarray, shape (k, places, components) [SI]."""
 
     @abstractmethod
     def characterise(self) -> Characterisation:
@@ -309,6 +323,16 @@ class Result(AnyResult):
     def one_pendulum(self) -> bool:
         """Whether its surfaces are those of one pendulum in place of the stack (docs/fidelity.md)."""
         return self.scene.fidelity == "equivalent"
+
+    @property
+    def work(self) -> Mapping[str, float]:
+        """Counters of the work of the solver, and wall_time [s]."""
+        return asdict(self.counters)
+
+    @property
+    def compared(self) -> dict[str, Array]:
+        """Horizontal force on the top support [N], and sliding of every surface [m]: as of `AnyResult.compared`."""
+        return {"force": self.history.top_force[:, None, :2], "sliding": self.history.sliding[:, :, None]}
 
     @property
     def model_changes(self) -> tuple[Note, ...]:

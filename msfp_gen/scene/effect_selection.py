@@ -425,10 +425,10 @@ def inertia_limit(scene: SceneFields, error: float) -> float:
     return error * max(surface.friction for surface in scene.bearing.surfaces)
 
 
-def slider_period(scene: SceneFields) -> float:
-    """Longest period of a slider on its stuck surface, 2 pi sqrt(m/(mu N/d_y + N/R)) [s]."""
-    rest, longest = load_at_rest(scene), 0.0
-    for index, surface in enumerate(scene.bearing.surfaces):
+def slider_period(bearing: Bearing, rest: float) -> float:
+    """Longest period of a slider on its stuck surface, 2 pi sqrt(m/(mu N/d_y + N/R)) [s]. rest: axial load [N]."""
+    longest = 0.0
+    for index, surface in enumerate(bearing.surfaces):
         stiffness = surface.friction * rest / surface.yield_displacement + rest / surface.radius
-        longest = max(longest, scene.bearing.bodies[index].mass / stiffness if stiffness > 0 else inf)
+        longest = max(longest, bearing.bodies[index].mass / stiffness if stiffness > 0 else inf)
     return float(2 * np.pi * np.sqrt(longest))

@@ -121,6 +121,11 @@ def all_effects(scene: SceneFields) -> Effects:
     if isinstance(requested, Effects):
         return requested
     effects = requested.resolve(friction=scene.law[0], top_rotation=(scene.top_rotation is not None) or None)
+    return with_monitored(scene, effects)
+
+
+def with_monitored(scene: Requested, effects: Effects) -> Effects:
+    """Effects extended by all that monitors may add."""
     for name in REQUIRED_EFFECTS:
         effects = _extended(scene, effects, name) or effects
     return effects
@@ -179,7 +184,7 @@ def monitor_options(
         "monitor_normal": UPLIFT_MONITOR_SHARE * load_at_rest(scene),
         "monitor_peak": rigid_mass_limit(scene),
         "monitor_inertia": inertia_limit(scene, selection.error),
-        "monitor_time": slider_period(scene),
+        "monitor_time": slider_period(scene.bearing, load_at_rest(scene)),
         "monitor_rise": _significant_rise(scene, effects, selection),
         "monitor_heating": np.ascontiguousarray(heating),
         "monitor_reach": np.ascontiguousarray(reach),

@@ -13,7 +13,8 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.motions.time_grid import TIME_TOLERANCE
 from msfp_gen.scene.bearing import Bearing
-from msfp_gen.scene.effect_selection import EffectSelection, select_effects
+from msfp_gen.scene.effect_selection import EffectSelection, load_at_rest, select_effects
+from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.scene.friction_parameters import bearing_for, check_bearing
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.scene_fields import InitialState, Limits, SceneFields, Stop
@@ -130,6 +131,15 @@ class Scene(SceneFields):
         """The scene with values of `Effects` given, without numbers of a friction law that it loses."""
         effects = replace(self.effects, **changes)
         return replace(self, effects=effects, bearing=bearing_for(self.bearing, changes.get("friction")))
+
+    def with_all_effects(self) -> Self:
+        """The scene with every effect that it has parameters for and does not fix; itself where effects are given."""
+        return self if isinstance(self.effects, Effects) else replace(self, effects=all_effects(self))
+
+    @property
+    def loads_at_rest(self) -> tuple[float, ...]:
+        """Axial load of the one bearing at rest [N]."""
+        return (load_at_rest(self),)
 
     def beginning_like(self, others: Sequence[Self]) -> Self:
         """The scene itself: a run takes in the effects that it needs, which `with_effects_of` gives to all."""

@@ -79,6 +79,13 @@ class System(Protocol):
     def with_effects(self, **changes: Any) -> Self:
         """It with values of `Effects` given for every bearing, without numbers of friction laws that it loses."""
 
+    def with_all_effects(self) -> Self:
+        """It with every effect that it has parameters for and does not fix."""
+
+    @property
+    def loads_at_rest(self) -> tuple[float, ...]:
+        """Axial load of every bearing at rest [N]."""
+
     def beginning_like(self, others: Sequence[Self]) -> Self:
         """It with every effect with which any of `others` begins."""
 
@@ -131,6 +138,15 @@ class OtherSystem(ABC):
     def with_effects(self, **changes: Any) -> Any:
         """It with values of `Effects` given for every bearing. Raises InputError."""
         raise InputError("the effects of this system cannot be changed")
+
+    def with_all_effects(self) -> Any:
+        """It with every effect that it has parameters for and does not fix."""
+        return self
+
+    @property
+    def loads_at_rest(self) -> tuple[float, ...]:
+        """Axial load of every bearing at rest [N]; () where the system gives none."""
+        return ()
 
     def beginning_like(self, others: Sequence[Any]) -> Any:
         """It with every effect with which any of `others`, which differ in values alone, begins."""

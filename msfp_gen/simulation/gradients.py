@@ -23,7 +23,7 @@ from msfp_gen.results.gradients import EVENTS, Gradients, energy_terms, gradient
 from msfp_gen.results.history import Event, Extremes
 from msfp_gen.results.note import Note
 from msfp_gen.results.result import Result
-from msfp_gen.scene.effect_selection import quasistatic, slider_period
+from msfp_gen.scene.effect_selection import load_at_rest, quasistatic, slider_period
 from msfp_gen.scene.friction_parameters import derived_slopes, law_parameters
 from msfp_gen.scene.parameters import Parameter, parameters_of
 from msfp_gen.scene.scene import Scene
@@ -318,7 +318,9 @@ def run_gradients(
     terms = energy_terms(energies, effects.uplift)
     gradients = _computed(segment, parameters, terms, rows, is_sprung(scene.top))
     steps, undamped = segment.run.counts["steps"], undamped_surfaces(scene, effects)
-    resolved = undamped and segment.run.time < steps * RESOLVED_SHARE * slider_period(scene)
+    resolved = undamped and segment.run.time < steps * RESOLVED_SHARE * slider_period(
+        scene.bearing, load_at_rest(scene)
+    )
     for index, parameter in enumerate(parameters):
         if resolved or not all(np.isfinite(values[index]).all() for values in gradients.arrays.values()):
             raise InputError(f"gradients = {parameter.path!r}: {RINGING}")
@@ -391,7 +393,7 @@ def gradient_notes(scene: Scene, effects: Effects, events: Sequence[Event]) -> t
         return tuple(Note(0.0, "ringing", surface, 0.0, UNDAMPED.format(surface=surface)) for surface in undamped)
     contact = next((event for event in events if event.kind == "rim_contact"), None)
     damping = min(surface.contact_damping for surface in scene.bearing.surfaces)
-    critical = slider_period(scene) / pi  # T omega/2 = 1
+    critical = slider_period(scene.bearing, load_at_rest(scene)) / pi  # T omega/2 = 1
     if contact is None or effects.sliders == "massless" or damping >= critical:
         return ()
     advised = max(1e-3, 1.2 * critical)

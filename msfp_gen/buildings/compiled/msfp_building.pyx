@@ -85,7 +85,7 @@ cdef extern from "msfp_building.h":
     void msfp_building_snapshot_write(const msfp_building *, void *) noexcept nogil
     int msfp_building_snapshot_read(msfp_building *, const void *, size_t) noexcept nogil
 
-COUNTS = ("steps", "rejected_steps", "iterations", "tangents", "step_lengths")
+COUNTS = ("steps", "rejected_steps", "newton_iterations", "tangents", "step_lengths")
 
 
 cdef const double *_doubles(list held, object values) except? NULL:

@@ -18,15 +18,23 @@ from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.tables import Table
 from msfp_gen.model.model import build_model, working_time
 from msfp_gen.scene.effect_selection import slider_period
-from msfp_gen.scene.effect_switching import all_effects
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.system import System
 from msfp_gen.simulation.outcome import Progress
 from msfp_gen.simulation.simulate import simulate
-from msfp_gen.specification.layout import Auto, Effects
-from msfp_gen.studies.accuracy.timed_run import CUT_OFF, Errors, Trial, dopri5_cost, errors, largest_error, run_native
+from msfp_gen.specification.layout import Effects
+from msfp_gen.studies.accuracy.timed_run import (
+    CUT_OFF,
+    Errors,
+    Trial,
+    check_measurable,
+    dopri5_cost,
+    errors,
+    run_native,
+)
 
 if TYPE_CHECKING:
-    from msfp_gen.results.result import Result
-    from msfp_gen.scene.scene import Scene
+    from msfp_gen.results.result import AnyResult
     from msfp_gen.scene.solver import Solver
 
 CANDIDATE_TOLERANCES = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21))  # 1e-2, 3e-3, 1e-3 ... 1e-10
@@ -43,28 +51,21 @@ METHOD: Final = "implicit"
 REFERENCE_METHOD = "esdirk4"  # other stages, order and dense output
 
 
-def effects_for(scene: Scene, error: float) -> tuple[Effects | Auto, str]:
-    """Effects for a run with relative error `error` [-], and the reasons as text.
+def with_effects_for(system: System, error: float) -> tuple[System, str]:
+    """The system with effects for a run with relative error `error` [-], and the reasons as text.
 
-    Given effects are kept. With effect selection (`Auto`) they are selected for half of `error`; the other half is for
-    the method.
+    Given effects are kept. With effect selection (`Auto`) those of one bearing are selected for half of `error`; the
+    other half is for the method. What is selected below a building does not depend on the error.
     """
-    effects = scene.effects
+    if not isinstance(system, Scene):
+        return system, "effects as they are selected for every bearing"
+    scene, effects = system, system.effects
     if isinstance(effects, Effects):
-        return effects, f"effects as the scene has them: {effects.dimension}, {effects.sliders} sliders"
+        return scene, f"effects as the scene has them: {effects.dimension}, {effects.sliders} sliders"
     effects = replace(effects, error=min(effects.error, error / 2))
-    reasons = replace(scene, effects=effects).effect_selection.reasons
-    return effects, "; ".join(f"{reason.effect} = {reason.chosen}: {reason.because}" for reason in reasons)
-
-
-def with_all_effects(scene: Scene) -> Scene:
-    """The scene with every effect that it has parameters for and does not fix, to measure the error of a selection.
-
-    A scene with given effects (`Effects`) is returned unchanged.
-    """
-    if isinstance(scene.effects, Effects):
-        return scene
-    return replace(scene, effects=all_effects(scene))
+    scene = replace(scene, effects=effects)
+    reasons = scene.effect_selection.reasons
+    return scene, "; ".join(f"{reason.effect} = {reason.chosen}: {reason.because}" for reason in reasons)
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ class Within:
         explained: whether `tables` lists attempts and reasons.
     """
 
-    result: Result
+    result: AnyResult
     target: float
     chosen: Attempt
     next_step: Attempt | None
@@ -132,9 +133,9 @@ class Within:
         components = (
             "not estimated"
             if errors is None
-            else (
-                f"force {share(errors.force_rms)} RMS, {share(errors.force_peak)} at its peak; sliding "
-                f"{share(errors.sliding_rms)} RMS, {share(errors.sliding_peak)} at its peak"
+            else "; ".join(
+                f"{name.replace('_', ' ')} {share(one.rms)} RMS, {share(one.peak)} at its peak"
+                for name, one in errors.parts.items()
             )
         )
         tighter = "not run in the time given"
@@ -189,14 +190,15 @@ def check_target(error: float, budget: float) -> None:
 
 
 def simulate_within(
-    scene: Scene, error: float, *, budget: float = BUDGET, explain: bool = False, progress: Progress | None = None
+    scene: System, error: float, *, budget: float = BUDGET, explain: bool = False, progress: Progress | None = None
 ) -> Within:
     """Run `scene` so that its relative error is at most `error`, at the least cost found.
 
     Args:
-        scene: the scene; its method and tolerance are chosen here.
-        error: bound of the RMS error over time and of the error of the peak, of the horizontal force on the top and of
-            sliding, each relative to its peak [-], such as 0.005.
+        scene: of a bearing, a building or any other system; its method and tolerance are chosen here.
+        error: bound of the RMS error over time and of the error of the peak, each relative to the peak [-], such as
+            0.005: of the horizontal force on the top and of sliding; of a building, of bearing displacement, base
+            shear, floor accelerations and storey drifts.
         budget: wall time of the search [s], without the time to build models.
         explain: also measure the cost of `dopri5`, the method of PEER 2017/07.
         progress: as for `simulate`, called during the final run.
@@ -206,24 +208,25 @@ def simulate_within(
         RunError: the error is not reached within the budget, or the runs fail.
     """
     check_target(error, budget)
+    check_measurable(scene)
     scene = replace(scene, solver=replace(scene.solver, method=METHOD))
-    effects, effect_reasons = effects_for(scene, error)
-    scene = replace(scene, effects=effects)
-    for candidate in (scene, with_all_effects(scene)):
-        build_model(candidate.bearing.layout, candidate.modelled)
+    scene, effect_reasons = with_effects_for(scene, error)
+    for candidate in (scene, scene.with_all_effects()):
+        for spec in candidate.specs:
+            build_model(spec.layout, spec.effects)
     begin = working_time()
     search = _Search(scene, error, begin + budget)
     try:
         index = search.loosest()
     except _ModelErrorTooLargeError as failure:
-        scene, effect_reasons = with_all_effects(scene), f"all effects: {effect_reasons}; but {failure}"
+        scene, effect_reasons = scene.with_all_effects(), f"all effects: {effect_reasons}; but {failure}"
         search = _Search(scene, error, begin + budget)
         index = search.loosest()
     index = search.cheapest(index)
     result = simulate(replace(scene, solver=search.solver(index)), progress=progress)
-    measured = tuple(note for note in result.notes if note.kind != "vibration")  # its estimate is the coarser one
-    result = replace(result, notes=measured)
-    chosen = replace(search.attempt(index), seconds=result.counters.wall_time)
+    if isinstance(scene, Scene):  # the estimate of that note is the coarser one
+        result = replace(result, notes=tuple(note for note in result.notes if note.kind != "vibration"))
+    chosen = replace(search.attempt(index), seconds=result.work["wall_time"])
     seconds_per_iteration = chosen.seconds / max(chosen.newton, 1)  # runs of the search write more rows than this one
     tighter = search.next_step(index)
     reasons = (effect_reasons, *search.reasons(index), *(dopri5_cost(scene) if explain else ()))
@@ -246,6 +249,19 @@ def simulate_within(
     return replace(within, result=replace(result, provenance=result.provenance | provenance))
 
 
+def _ringing(system: System) -> tuple[float, bool]:
+    """Longest period of a slider on its stuck surface [s]; infinite without inertia. Whether nothing damps it."""
+    bearings = zip(system.every_bearing, system.every_effects, system.loads_at_rest, strict=False)
+    period, rings = 0.0, False
+    for bearing, effects, load in bearings:
+        if effects.sliders == "inertial":
+            own = slider_period(bearing, load)
+            period = max(period, own)
+            damping = min(surface.contact_damping for surface in bearing.surfaces)
+            rings = rings or pi * damping / own <= DAMPED
+    return period or float("inf"), rings
+
+
 class _ModelErrorTooLargeError(Exception):
     """The selected effects keep a run from its end, or leave an error above the target at any tolerance."""
 
@@ -256,15 +272,12 @@ class _Search:
     # `index`: of a candidate tolerance, loosest first. Where the effects were selected (`Auto`), the reference runs
     # model all effects, so that the estimate includes the error of the selection.
 
-    def __init__(self, scene: Scene, target: float, deadline: float) -> None:
+    def __init__(self, scene: System, target: float, deadline: float) -> None:
         self.scene, self.target, self.deadline = scene, target, deadline
         self.trials: dict[int, Trial] = {}
         self.references: dict[int, Trial] = {}  # index of a run -> its reference run
-        self.reference_scene = with_all_effects(scene)
-        inertial = self.reference_scene.modelled.sliders == "inertial"
-        self.period = slider_period(self.reference_scene) if inertial else float("inf")
-        damping = min(surface.contact_damping for surface in self.reference_scene.bearing.surfaces)
-        self.rings = inertial and pi * damping / self.period <= DAMPED
+        self.reference_scene = scene.with_all_effects()
+        self.period, self.rings = _ringing(self.reference_scene)
         self.filtered = False  # whether the reference runs filter undamped ringing, which no estimate then includes
 
     def solver(self, index: int) -> Solver:
@@ -290,7 +303,7 @@ class _Search:
                 self.references[index] = self._run(REFERENCE_METHOD, scene, tolerance)
         return self.references[index]
 
-    def _with_short_steps(self, index: int) -> tuple[Scene, float]:
+    def _with_short_steps(self, index: int) -> tuple[System, float]:
         """The reference scene with steps of at most half the mean step of a run, and several in a slider's period."""
         # Also the longest step over that half. Newton's method leaves a share of the tolerance as a residual in every
         # stage. What it leaves adds up over the steps, so the tolerance has to shrink with them.
@@ -298,7 +311,8 @@ class _Search:
         steps = [half, *([scene.solver.max_step] if scene.solver.max_step is not None else [])]
         if not self.filtered and STEPS_PER_PERIOD * scene.end <= MOST_STEPS * self.period:
             steps.append(self.period / STEPS_PER_PERIOD)
-        return replace(scene, solver=replace(scene.solver, max_step=min(steps), first_step=None)), min(steps) / half
+        solver = replace(scene.solver, max_step=min(steps), first_step=None)
+        return replace(scene, solver=solver), min(steps) / half
 
     @cached_property
     def resolved(self) -> Trial:
@@ -311,7 +325,7 @@ class _Search:
     def _remaining(self) -> float:
         return max(self.deadline - working_time(), 0.05)
 
-    def _run(self, method: str, scene: Scene, tolerance: float) -> Trial:
+    def _run(self, method: str, scene: System, tolerance: float) -> Trial:
         trial = run_native(method, scene, tolerance, self._remaining, repeats=0)
         if trial.status == CUT_OFF:
             raise RunError(self._target_missed(), status="accuracy")
@@ -380,7 +394,7 @@ class _Search:
             # The reference run of the looser neighbour has a third of the tolerance: more of its own error counts.
             close = index not in self.references and reference is not None and reference.rtol > 0.2 * trial.rtol
             factor = 2 * SAFETY if close else SAFETY
-            estimate = factor * largest_error(differences)
+            estimate = factor * differences.largest
             if self.filtered and (ringing := self._error_of_ringing(index)) <= self.target:
                 estimate = max(estimate, ringing)
         return Attempt(trial.method, trial.rtol, trial.seconds, trial.newton, estimate, differences, trial.status)
@@ -388,7 +402,7 @@ class _Search:
     def _error_of_ringing(self, index: int) -> float:
         """Estimated error of a run against the one that resolves undamped ringing; infinite where that did not end."""
         found = errors(self.trial(index), self.resolved) if self.resolved.finished else None
-        return float("inf") if found is None else SAFETY * largest_error(found)
+        return float("inf") if found is None else SAFETY * found.largest
 
     def next_step(self, index: int) -> Attempt | None:
         """The attempt at the next tighter tolerance, run where needed; None if there is no time for it."""
@@ -429,7 +443,8 @@ class _Search:
             "a run that resolves it" if resolved.finished else f"until {resolved.reached:.3g} s a run that resolves it"
         )
         effect = (
-            f"{words} differs by {share(found.force_rms)} RMS in force, {share(found.sliding_rms)} in sliding"
+            f"{words} differs in RMS by "
+            + ", ".join(f"{share(one.rms)} in {name.replace('_', ' ')}" for name, one in found.parts.items())
             if found
             else "no run resolved it"
         )

@@ -18,12 +18,14 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.motions.motion import Motion
+from msfp_gen.scene.scene import Scene
 from msfp_gen.studies.accuracy.series import run_opensees, run_series
 from msfp_gen.studies.accuracy.timed_run import (
     CUT_OFF,
     OK,
     Trial,
     comparison_times,
+    of_bearing,
     refused_trial,
     require_base_motion_only,
     run_native,
@@ -31,7 +33,7 @@ from msfp_gen.studies.accuracy.timed_run import (
 
 if TYPE_CHECKING:
     from msfp_gen.model.model import Ode
-    from msfp_gen.scene.scene import Scene
+    from msfp_gen.scene.system import System
 
 FIRST_STEP = 1e-4  # [s], as in the runtime; some integrators choose a first step that leaves the range of the model
 WITH_JACOBIAN = ("Radau", "BDF", "LSODA")
@@ -49,14 +51,14 @@ class Work:
     steps: int = 0
 
 
-def run_library(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
-    """Run `scene` by the SciPy integrator `name` at `rtol`, for at most about `limit` seconds of wall time.
+def run_library(name: str, system: System, rtol: float, limit: float) -> Trial:
+    """Run one bearing by the SciPy integrator `name` at `rtol`, for at most about `limit` seconds of wall time.
 
     Absolute tolerances: a hundredth of `rtol` for angles [rad], as in `Solver`, and for angular rates [rad/s]; `rtol`
     for Y and Z. No step is longer than the sampling of the motion resolves, and integration restarts at each declared
     jump. Raises InputError if the model cannot be written as an ordinary differential equation.
     """
-    require_base_motion_only(scene)
+    scene = require_base_motion_only(system)
     if scene.modelled.uplift:
         raise InputError("effects.uplift: library integrators are compared without it; leave it out")
     ode = build_model(scene.bearing.layout, scene.modelled).as_ode(scene.bearing, scene.motion, scene.top)
@@ -87,7 +89,7 @@ def run_library(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
     if status == OK and len(force) < len(times):
         status, message = "failed", f"no acceleration at t = {reached:.6g} s"
     cost = work.newton, work.evaluations, work.steps
-    return Trial(name, rtol, status, seconds, reached, scene.end, *cost, force, sliding, message)
+    return Trial(name, rtol, status, seconds, reached, scene.end, *cost, of_bearing(force, sliding), message)
 
 
 def _solver(kind: Any, scene: Scene, ode: Ode, work: Work, first: float, last: float, y: Array, rtol: float) -> Any:
@@ -155,10 +157,10 @@ class Method:
 
     name: str
     family: str
-    run: Callable[[Scene, Any, float], Trial]
+    run: Callable[[System, Any, float], Trial]
     stepped: bool = False
 
-    def attempt(self, scene: Scene, setting: float, limit: float) -> Trial:
+    def attempt(self, scene: System, setting: float, limit: float) -> Trial:
         """Run `scene`. The status of the trial is "refused" where the method cannot run the scene.
 
         The trial of a run that fails states the failure. Raises RunError where the user interrupts.
@@ -202,37 +204,39 @@ def _effects(name: str, **changes: Any) -> Method:
     return Method(name, "implicit", partial(_with_effects, changes))
 
 
-def _stepped(name: str, run: Callable[[Scene, int], Trial]) -> Method:
+def _stepped(name: str, run: Callable[[System, int], Trial]) -> Method:
     """A model without error control. run: (scene, number of steps) -> Trial."""
     return Method(name, name, lambda scene, steps, _: run(scene, steps), stepped=True)
 
 
-def _with_effects(changes: dict[str, Any], scene: Scene, rtol: float, limit: float) -> Trial:
+def _with_effects(changes: dict[str, Any], scene: System, rtol: float, limit: float) -> Trial:
     """Run the scene by the default method with other effects."""
-    current = scene.modelled
-    if all(getattr(current, name) == value for name, value in changes.items()):
+    if all(getattr(effects, name) == value for effects in scene.every_effects for name, value in changes.items()):
         raise InputError(f"the scene itself has {', '.join(f'{name} = {value!r}' for name, value in changes.items())}")
-    effects = replace(current, **changes)
-    if effects.dimension == "planar" and scene.motion.plane() is None:
-        return _axis_by_axis(scene, effects, rtol, limit)
-    return run_native("implicit", replace(scene, effects=effects), rtol, limit)
+    if isinstance(scene, Scene) and changes.get("dimension") == "planar" and scene.motion.plane() is None:
+        return _axis_by_axis(changes, scene, rtol, limit)
+    return run_native("implicit", scene.with_effects(**changes), rtol, limit)
 
 
-def _axis_by_axis(scene: Scene, effects: Any, rtol: float, limit: float) -> Trial:
+def _axis_by_axis(changes: dict[str, Any], scene: Scene, rtol: float, limit: float) -> Trial:
     """Run a motion in two directions by one planar model for each horizontal axis, uncoupled, and combine them."""
     motions = (_along(scene.motion, axis) for axis in (0, 1))
-    planar = (replace(scene, effects=effects, motion=motion, motion_table=None) for motion in motions)
+    planar = (replace(scene, motion=motion, motion_table=None).with_effects(**changes) for motion in motions)
     along_x, along_y = (run_native("implicit", axis_scene, rtol, limit) for axis_scene in planar)
     worse = max(along_x, along_y, key=lambda trial: not trial.finished)
-    rows = min(len(along_x.force), len(along_y.force))
+    rows = min(along_x.rows, along_y.rows)
+    x, y = ({name: values[:rows, :, 0] for name, values in one.histories.items()} for one in (along_x, along_y))
     costs = ("seconds", "newton", "evaluations", "steps")
     sums = {name: getattr(along_x, name) + getattr(along_y, name) for name in costs}
     return replace(
         worse,
         **sums,
         reached=min(along_x.reached, along_y.reached),
-        force=np.column_stack([along_x.force[:rows, 0], along_y.force[:rows, 1]]),
-        sliding=np.hypot(along_x.sliding[:rows], along_y.sliding[:rows]),
+        histories=of_bearing(
+            np.column_stack([x["force"], along_y.histories["force"][:rows, 0, 1]]), np.hypot(x["sliding"], y["sliding"])
+        )
+        if rows
+        else {},
     )
 
 

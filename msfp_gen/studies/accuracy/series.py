@@ -23,11 +23,12 @@ from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.scene.fidelity import Link, series_links
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Layout
-from msfp_gen.studies.accuracy.timed_run import OK, Trial, comparison_times, require_base_motion_only
+from msfp_gen.studies.accuracy.timed_run import OK, Trial, comparison_times, of_bearing, require_base_motion_only
 
 if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.scene.system import System
 
 DIFFERENCE_STEP = 1e-8  # increment of F for difference quotients [-]
 ROUNDING = 1e-4  # radius of the rounded corner at the onset of sliding, over the friction coefficient
@@ -127,12 +128,12 @@ def _newton_step(column_x: complex, column_y: complex, value: complex) -> comple
     return complex(x, y)
 
 
-def run_series(scene: Scene, steps: int, arms: bool = False) -> Trial:
-    """Run `scene` by the linearised bearing in `steps` equal steps; `arms` as in `series_links`.
+def run_series(system: System, steps: int, arms: bool = False) -> Trial:
+    """Run one bearing by the linearised bearing in `steps` equal steps; `arms` as in `series_links`.
 
     Raises InputError for a prescribed load, or a rig without axial load or stiffness.
     """
-    require_base_motion_only(scene)
+    scene = require_base_motion_only(system)
     begin = time.perf_counter()
     times = np.linspace(0.0, scene.end, steps + 1)
     series = Series(scene.bearing, scene.modelled.rims, arms)
@@ -154,7 +155,7 @@ def _trial(name: str, scene: Scene, steps: int, times: Array, columns: Array, se
     status, message = (OK, "") if reached == steps else ("failed", f"analyze failed at t = {last:.4g} s")
     cost, setting = (0, 0, reached), scene.end / steps
     parts = rows[:, :2], rows[:, 2:]
-    return Trial(name, setting, status, seconds, last, scene.end, *cost, *parts, message, stepped=True)
+    return Trial(name, setting, status, seconds, last, scene.end, *cost, of_bearing(*parts), message, stepped=True)
 
 
 def _as_complex(vectors: Array) -> list[complex]:
@@ -199,12 +200,12 @@ STIFF = 1e10  # stiffness of the other degrees of freedom [N/m, N m/rad]
 YIELD = 1e-4  # least yield displacement passed to the element [m]; its manual recommends 0.25 to 1 mm
 
 
-def run_opensees(scene: Scene, steps: int) -> Trial:
-    """Run `scene` by OpenSees in `steps` equal steps. The trial has no sliding, since the element computes none.
+def run_opensees(system: System, steps: int) -> Trial:
+    """Run one bearing by OpenSees in `steps` equal steps. The trial has no sliding, since the element computes none.
 
     Raises InputError if OpenSees is not installed, or the element cannot represent this bearing under this load.
     """
-    require_base_motion_only(scene)
+    scene = require_base_motion_only(system)
     if find_spec("openseespy") is None:
         raise InputError("TripleFrictionPendulum needs openseespy; pip install openseespy")
     lower, upper, inner = _links(scene)

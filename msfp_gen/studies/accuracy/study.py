@@ -12,10 +12,10 @@ import platform
 import subprocess
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from math import isfinite, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,12 +23,12 @@ from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.output import make_folder, write_bytes
 from msfp_gen.common.tables import Table, write_rows
 from msfp_gen.common.version import __version__
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.system import System
 from msfp_gen.simulation.simulate import simulate
-from msfp_gen.studies.accuracy.error_target import with_all_effects
 from msfp_gen.studies.accuracy.methods import METHODS, VARIANTS, Method, methods_named
 from msfp_gen.studies.accuracy.timed_run import (
     CUT_OFF,
-    ERRORS,
     REFUSED,
     Errors,
     Reference,
@@ -36,9 +36,6 @@ from msfp_gen.studies.accuracy.timed_run import (
     best_reference,
     errors,
 )
-
-if TYPE_CHECKING:
-    from msfp_gen.scene.scene import Scene
 
 TOLERANCES = tuple(10.0**-k for k in range(2, 10))
 MODEL_TOLERANCES = TOLERANCES[:6]
@@ -51,8 +48,8 @@ TIGHTEST = 1e-11  # least tolerance of a reference run
 WRONG = 30.0  # RMS error over tolerance above which a success is wrong
 NEVER_WRONG, ALWAYS_WRONG = 1e-3, 0.1  # RMS error below which a success is never wrong, above which it always is
 FAMILIES = {name: method.family for name, method in METHODS.items()}
+KINDS = {"max": "maximum", "rms": "RMS"}  # of errors in tables and figures
 Say = Callable[[str], None]
-NAMES = tuple(field.name for field in fields(Errors))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +70,9 @@ class Point:
 
     @property
     def known_errors(self) -> dict[str, float | None]:
-        """Name of an error, as in `Errors` -> error [-]; None where undefined."""
+        """Name of an error, as in `Errors.as_dict` -> error [-]; None where it is not defined."""
         known = {} if self.errors is None else self.errors.as_dict()
-        return {name: known[name] if isfinite(known.get(name, nan)) else None for name in NAMES}
+        return {name: value if isfinite(value) else None for name, value in known.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +87,7 @@ class Study:
         notes: on settings that were not run, and on the reference, as text.
     """
 
-    scene: Scene
+    scene: System
     kind: str
     points: tuple[Point, ...]
     reference: Reference
@@ -101,13 +98,20 @@ class Study:
         return [point for point in self.points if point.series == series]
 
     @property
+    def shown(self) -> dict[str, str]:
+        """The errors of tables and figures: name -> words. Of more than two quantities the RMS errors alone."""
+        quantities = list(self.reference.trial.histories)
+        kinds = KINDS if len(quantities) <= 2 else {"rms": KINDS["rms"]}
+        return {f"{name}_{kind}": f"{_words(name)}, {text}" for name in quantities for kind, text in kinds.items()}
+
+    @property
     def series(self) -> list[str]:
         """Names of all series, in the order of the points."""
         return list(dict.fromkeys(point.series for point in self.points))
 
 
 def work_precision(
-    scene: Scene,
+    scene: System,
     *,
     methods: Sequence[str] | None = None,
     tolerances: Sequence[float] = TOLERANCES,
@@ -117,7 +121,7 @@ def work_precision(
     """Run `scene` by every method at every tolerance and measure the error of each run.
 
     Args:
-        scene: the scene.
+        scene: of a bearing, a building, or any other system.
         methods: names in `METHODS`; None: all.
         tolerances: relative tolerances [-].
         limit: wall time of one run [s]. A longer run is cut off; after two runs of a method in a row that were cut off,
@@ -142,7 +146,7 @@ def work_precision(
 
 
 def model_errors(
-    scene: Scene,
+    scene: System,
     *,
     tolerances: Sequence[float] = MODEL_TOLERANCES,
     limit: float = LIMIT,
@@ -170,7 +174,7 @@ def model_errors(
 
 
 def _variant_trials(
-    variant: Method, scene: Scene, tolerances: Sequence[float], limit: float, say: Say
+    variant: Method, scene: System, tolerances: Sequence[float], limit: float, say: Say
 ) -> tuple[list[Trial], list[str]]:
     """The runs of one simplified model, and notes on settings that were not run."""
     trials: list[Trial] = []
@@ -185,7 +189,7 @@ def _variant_trials(
     return trials, []
 
 
-def _step_counts(scene: Scene) -> list[int]:
+def _step_counts(scene: System) -> list[int]:
     """Numbers of steps: STEPS; for a long record one, two and four steps in each of its sampling intervals."""
     least = 1 if scene.motion.max_step is None else int(np.ceil(scene.end / scene.motion.max_step))
     return [least, 2 * least, 4 * least] if least > STEPS[1] else list(STEPS)
@@ -202,13 +206,16 @@ def check_settings(tolerances: Sequence[float], limit: float) -> None:
         raise InputError(f"limit = {limit:g}: give seconds above zero")
 
 
-def without_stop(scene: Scene) -> Scene:
-    """The scene with a duration up to its stop condition in place of this condition, which SciPy does not have.
+def without_stop(system: System) -> System:
+    """The system with a duration up to its stop condition in place of this condition, which SciPy does not have.
 
     All effects are modelled, so that no run changes its model. Uplift is modelled only where `Auto` selects it at the
-    start, since most methods have no uplift: a run in which a surface opens then fails.
+    start, since most methods have no uplift: a run in which a surface opens then fails. Another system stays as it is.
     """
-    complete = with_all_effects(scene)
+    if not isinstance(system, Scene):
+        return system
+    scene = system
+    complete = scene.with_all_effects()
     if complete is not scene:
         scene = replace(complete, effects=replace(complete.modelled, uplift=scene.modelled.uplift))
     if scene.stop is None:
@@ -218,7 +225,7 @@ def without_stop(scene: Scene) -> Scene:
 
 
 def run_tolerances(
-    method: Method, scene: Scene, tolerances: Sequence[float], limit: float, say: Say
+    method: Method, scene: System, tolerances: Sequence[float], limit: float, say: Say
 ) -> tuple[list[Trial], list[str]]:
     """Run one method at `tolerances`, loosest first; returns the runs, and notes on tolerances that were not run."""
     trials: list[Trial] = []
@@ -239,7 +246,7 @@ def trial_line(trial: Trial) -> str:
     return f"{trial.method} at {trial.setting}: {outcome}, {trial.seconds:.3g} s"
 
 
-def tighter_runs(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
+def tighter_runs(scene: System, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
     """Runs for a reference: the default method below its tightest finished tolerance, until a run does not finish."""
     finished = [trial.rtol for trial in trials if trial.method == "implicit" and trial.finished]
     rtol, tighter = min(finished, default=1e-2) / 10, []
@@ -253,7 +260,7 @@ def tighter_runs(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) 
     return tighter
 
 
-def confirming_reruns(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
+def confirming_reruns(scene: System, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
     """Repeat runs that were cut off with a longer limit, as candidates for the reference.
 
     Of each method the tightest run that can finish within the longer limit counts; the CONFIRMING_RUNS fastest of these
@@ -301,9 +308,7 @@ def reference_notes(reference: Reference) -> list[str]:
 
 
 COLUMNS = ("method", "rtol", "status", "seconds", "expected_seconds", "newton", "evaluations", "steps", "reached")
-HEADS = (
-    "", "tolerance", "outcome", "seconds", "Newton iterations", "force max", "force RMS", "sliding max", "sliding RMS",
-)  # fmt: skip
+HEADS = ("", "tolerance", "outcome", "seconds", "Newton iterations")
 
 
 def machine() -> dict[str, str]:
@@ -380,10 +385,10 @@ def _points(study: Study) -> Table:
     for point in study.points:
         trial, known = point.trial, point.known_errors
         expected = f"{trial.seconds:.3g}" if trial.status != CUT_OFF else f"(about {trial.expected_seconds:.2g})"
-        errors_shown = ["-" if (error := known[name]) is None else f"{error:.1e}" for name in ERRORS]
+        errors_shown = ["-" if (error := known.get(name)) is None else f"{error:.1e}" for name in study.shown]
         outcome = "WRONG SUCCESS" if point.wrong else trial.status
         cells.append((point.series, trial.setting, outcome, expected, str(trial.newton), *errors_shown))
-    return Table(f"{study.kind} of {study.scene.name or 'unnamed scene'}", HEADS, cells)
+    return Table(f"{study.kind} of {study.scene.name or 'unnamed scene'}", (*HEADS, *study.shown.values()), cells)
 
 
 def reference_text(study: Study) -> str:
@@ -392,10 +397,8 @@ def reference_text(study: Study) -> str:
     text = f"{first.method} at {first.rtol:g}"
     if second is None or floor is None:
         return f"{text}, not confirmed by a second run"
-    return (
-        f"{text}, confirmed by {second.method} at {second.rtol:g}: they differ by {floor.force_rms:.1e} RMS and "
-        f"{floor.force_max:.1e} at most in force, {floor.sliding_rms:.1e} and {floor.sliding_max:.1e} in sliding"
-    )
+    parts = [f"{one.rms:.1e} RMS and {one.max:.1e} at most in {_words(name)}" for name, one in floor.parts.items()]
+    return f"{text}, confirmed by {second.method} at {second.rtol:g}: they differ by {', '.join(parts)}"
 
 
 def markdown(study: Study) -> str:
@@ -415,8 +418,9 @@ def figure_table(study: Study) -> dict[str, dict[str, list[float]]]:
         shares = [max(p.trial.reached / p.trial.end, 1e-9) if p.trial.status == CUT_OFF else 1.0 for p in points]
         if any(p.trial.newton for p in points):
             columns["newton"] = [p.trial.newton / share for p, share in zip(points, shares, strict=True)]
-        for name in ERRORS:
-            columns[name] = [nan if p.errors is None else getattr(p.errors, name) for p in points]
+        known = [{} if p.errors is None else p.errors.as_dict() for p in points]
+        for name in study.shown:
+            columns[name] = [errors.get(name, nan) for errors in known]
         columns["cut"] = [float(p.trial.status == CUT_OFF) for p in points]
         columns["failed"] = [float(not p.trial.finished and p.trial.status != CUT_OFF) for p in points]
         columns["wrong"] = [float(p.wrong) for p in points]
@@ -431,7 +435,7 @@ def draw(study: Study, path: str | Path) -> None:
     floor, second = study.reference.floor, study.reference.second
     floors = {} if floor is None or second is None else {f"references differ ({second.method})": floor.as_dict()}
     title = f"{study.kind.capitalize()}: {study.scene.name or 'unnamed scene'}"
-    plot_work_precision(figure_table(study), path, errors=ERRORS, floors=floors, title=title)
+    plot_work_precision(figure_table(study), path, errors=study.shown, floors=floors, title=title)
 
 
 def default_point(study: Study) -> Point | None:
@@ -460,7 +464,7 @@ def cost_table(study: Study) -> Table:
     ]
     return Table(
         f"what accuracy costs: {summary_line(study)}",
-        ("", "tolerance", "error of force and sliding, RMS", "time"),
+        ("", "tolerance", f"error of {_quantities(study)}, RMS", "time"),
         cells,
     )
 
@@ -478,8 +482,17 @@ def draw_summary(study: Study, path: str | Path) -> None:
         f"tolerance {point.trial.rtol:g}": {"seconds": point.trial.seconds, "error": point.errors.worst_rms}
     }  # fmt: skip
     plot_work_precision(
-        table, path, errors={"error": "error of force and sliding, RMS"}, marks=marks, title=summary_line(study)
+        table, path, errors={"error": f"error of {_quantities(study)}, RMS"}, marks=marks, title=summary_line(study)
     )
+
+
+def _words(quantity: str) -> str:
+    return quantity.replace("_", " ")
+
+
+def _quantities(study: Study) -> str:
+    *first, last = map(_words, study.reference.trial.histories)
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _share(error: float) -> str:

@@ -2,59 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, cast
+from math import nan
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.system import System
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.batch import OUT_OF_TIME, run_to_end
 
-if TYPE_CHECKING:
-    from msfp_gen.scene.scene import Scene
-
-ERRORS = {
-    "force_max": "top force, maximum",
-    "force_rms": "top force, RMS",
-    "sliding_max": "sliding, maximum",
-    "sliding_rms": "sliding, RMS",
-}
 ROWS = 2000  # intervals between the instants at which runs are compared
 QUICK, REPEATS = 0.1, 5  # a run shorter than the first [s] is timed as often as the second; the fastest counts
 CUT_OFF, REFUSED, OK = "cut off", "refused", "ok"
 
 
-@dataclass(frozen=True)
-class Errors:
-    """Errors of one run [-]: of the horizontal top force over its peak, of sliding over its peak on any surface.
+class Error(NamedTuple):
+    """Errors of one quantity over its peak at any place [-].
 
-    Attributes:
-        force_max, sliding_max: at the worst instant; of sliding, of the worst surface.
-        force_rms, sliding_rms: RMS over time; of sliding, of the worst surface.
-        force_peak, sliding_peak: of the peak value, whenever it occurs.
-
-    Errors of sliding are NaN for a run without sliding displacements.
+    max: at the worst instant of the worst place. rms: over time, of the worst place. peak: of the peak value, whenever
+    it occurs. NaN for a run that does not compute the quantity.
     """
 
-    force_max: float
-    force_rms: float
-    sliding_max: float
-    sliding_rms: float
-    force_peak: float
-    sliding_peak: float
+    max: float
+    rms: float
+    peak: float
+
+
+UNKNOWN = Error(nan, nan, nan)
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of one run. parts: quantity, as in `Trial.histories` -> its errors."""
+
+    parts: Mapping[str, Error]
+
+    def __getitem__(self, quantity: str) -> Error:
+        """The errors of a quantity."""
+        return self.parts[quantity]
 
     @property
     def worst_rms(self) -> float:
-        """The larger of the RMS errors of force and sliding [-]."""
-        return float(np.fmax(self.force_rms, self.sliding_rms))
+        """The largest RMS error [-]."""
+        return _largest(error.rms for error in self.parts.values())
+
+    @property
+    def largest(self) -> float:
+        """The relative error that a target bounds: the largest of the RMS errors and the errors of peaks [-]."""
+        return _largest(value for error in self.parts.values() for value in (error.rms, error.peak))
 
     def as_dict(self) -> dict[str, float]:
-        """Name -> error."""
-        return asdict(self)
+        """Quantity and kind of error, such as force_rms -> error."""
+        return {f"{name}_{kind}": value for name, one in self.parts.items() for kind, value in one._asdict().items()}
+
+
+def _largest(values: Iterable[float]) -> float:
+    return float(np.fmax.reduce([nan, *values]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,40 +86,38 @@ class Reference:
 def errors(trial: Trial, reference: Trial) -> Errors | None:
     """Errors of `trial` against `reference` over the common rows; None if there are none.
 
-    Raises InputError if force or sliding of the reference are zero, so that relative errors are undefined.
+    Raises InputError if a quantity of the reference is zero at all times, so that relative errors are undefined.
     """
-    rows = min(len(trial.force), len(reference.force))
+    rows = min(trial.rows, reference.rows)
     if not rows:
         return None
-    force = np.linalg.norm(trial.force[:rows] - reference.force[:rows], axis=1)
-    computed = trial.sliding if trial.sliding.shape[1] else np.full((rows, 1), np.nan)
-    sliding = np.abs(computed[:rows] - reference.sliding[:rows])
-    peak_force, peak_sliding = _peaks(reference)
-    if not peak_force or not peak_sliding:
-        raise InputError("scene: the bearing did not move, so relative errors are not defined; give it a motion")
-    return Errors(
-        float(force.max() / peak_force),
-        float(_rms(force) / peak_force),
-        float(sliding.max() / peak_sliding),
-        float(_rms(sliding).max() / peak_sliding),
-        abs(_peaks(trial)[0] / peak_force - 1),
-        abs(_peaks(trial)[1] / peak_sliding - 1),
-    )
+    return Errors({name: _error(trial.histories.get(name), exact, rows) for name, exact in reference.histories.items()})
 
 
-def largest_error(differences: Errors) -> float:
-    """The relative error that a target bounds: the largest of the RMS and peak errors of force and sliding [-]."""
-    return max(differences.force_rms, differences.sliding_rms, differences.force_peak, differences.sliding_peak)
+def _error(found: Array | None, exact: Array, rows: int) -> Error:
+    """Errors of one quantity over the first rows. found: None where it was not computed."""
+    peak = _peak(exact)
+    if not peak:
+        raise InputError("scene: nothing moved, so relative errors are not defined; give it a motion")
+    if found is None:
+        return UNKNOWN
+    away = np.linalg.norm(found[:rows] - exact[:rows], axis=2) / peak
+    rms = np.sqrt(np.mean(np.square(away), axis=0))
+    return Error(float(away.max()), float(rms.max()), abs(_peak(found) / peak - 1))
 
 
-def _peaks(trial: Trial) -> tuple[float, float]:
-    """Peak horizontal force [N] and largest sliding displacement [m], NaN for a run without sliding."""
-    sliding = float(trial.sliding.max()) if trial.sliding.size else float("nan")
-    return float(np.linalg.norm(trial.force, axis=1).max()), sliding
+def _peak(history: Array) -> float:
+    """Largest magnitude at any time and place."""
+    return float(np.linalg.norm(history, axis=2).max())
 
 
-def _rms(values: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(np.square(values), axis=0)))
+def of_bearing(force: Array, sliding: Array) -> dict[str, Array]:
+    """The histories of a trial of one bearing.
+
+    force: horizontal force on the top support, ndarray, shape (k, 2) [N]. sliding: of every surface, shape (k, n-1)
+    [m]; shape (k, 0) where it is not computed.
+    """
+    return {"force": force[:, None]} | ({"sliding": sliding[:, :, None]} if sliding.shape[1] else {})
 
 
 def best_reference(trials: Iterable[Trial], families: dict[str, str]) -> Reference:
@@ -152,9 +159,9 @@ class Trial:
         seconds: wall time of the integration [s], for a run that was cut off until then.
         reached, end: simulated time at the end of the run, and end of the scene [s].
         newton: number of Newton iterations on the equations of motion, in all loops.
-        evaluations, steps: numbers of evaluations of the equations, and of accepted steps.
-        force: horizontal force on the top support at the first K of `comparison_times(end)`, shape (K, 2) [N].
-        sliding: sliding of every surface at these times, shape (K, n-1) [m].
+        evaluations, steps: numbers of evaluations of the equations, 0 of a building, and of accepted steps.
+        histories: quantity -> its values at the first K instants, shape (K, places, components) [SI]; {} for a run
+            without rows. The instants are `comparison_times(end)`; of a building the times of its rows.
         message: one line about a failure.
         stepped: whether the method has no error control.
     """
@@ -168,8 +175,7 @@ class Trial:
     newton: int
     evaluations: int
     steps: int
-    force: Array
-    sliding: Array
+    histories: Mapping[str, Array]
     message: str = ""
     stepped: bool = False
 
@@ -177,6 +183,11 @@ class Trial:
     def setting(self) -> str:
         """The tolerance, or for a stepped method the step with its unit, as text."""
         return f"{self.rtol:.3g} s" if self.stepped else f"{self.rtol:g}"
+
+    @property
+    def rows(self) -> int:
+        """Number of instants at which the run can be compared."""
+        return min((len(values) for values in self.histories.values()), default=0)
 
     @property
     def finished(self) -> bool:
@@ -196,27 +207,41 @@ def comparison_times(end: float) -> Array:
     return np.linspace(0.0, end, ROWS + 1)
 
 
-def refused_trial(method: str, rtol: float, scene: Scene, why: str) -> Trial:
-    """The trial of a method that cannot run a scene. why: its message."""
-    empty = np.zeros((0, 2)), np.zeros((0, scene.bearing.layout.surfaces))
-    return Trial(method, rtol, REFUSED, 0.0, 0.0, scene.end, 0, 0, 0, *empty, message=why)
+def refused_trial(method: str, rtol: float, system: System, why: str) -> Trial:
+    """The trial of a method that cannot run a system. why: its message."""
+    return Trial(method, rtol, REFUSED, 0.0, 0.0, system.end, 0, 0, 0, {}, message=why)
 
 
-def require_base_motion_only(scene: Scene) -> None:
-    """Raise InputError for a scene with a load or a rotation of the top, which the calling method would ignore."""
+def require_base_motion_only(system: System) -> Scene:
+    """The scene of one bearing that the base moves; other methods than those of the runtime ignore all else.
+
+    Raises InputError for another system, and for a scene with a load or a rotation of the top.
+    """
+    if not isinstance(system, Scene):
+        raise InputError("this method runs one bearing alone")
     for name in ("load", "top_rotation"):
-        if getattr(scene, name) is not None:
+        if getattr(system, name) is not None:
             raise InputError(f"{name}: this method applies the motion of the base only; leave {name} or the method out")
+    return system
 
 
-def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int = REPEATS) -> Trial:
-    """Run `scene` by a method of the compiled runtime at `rtol`, for at most about `limit` seconds of wall time.
+def check_measurable(system: System) -> None:
+    """Raise InputError for a system whose tolerance cannot be chosen."""
+    if "solver" not in system.__dataclass_fields__:
+        raise InputError(f"{system.name}: errors of this system cannot be measured, since it has no field solver")
+
+
+def run_native(name: str, system: System, rtol: float, limit: float, repeats: int = REPEATS) -> Trial:
+    """Run a system by a method of the compiled runtime at `rtol`, for at most about `limit` seconds of wall time.
 
     repeats: number of repetitions of a run shorter than QUICK, for its time. Raises InputError if the method cannot run
-    the scene.
+    the system, or the tolerance of the system cannot be chosen.
     """
-    solver = replace(scene.solver, method=cast("Any", name), rtol=rtol, atol_angle=None)
-    sampled = replace(scene, solver=solver, output_step=scene.end / ROWS)
+    check_measurable(system)
+    solver = replace(system.solver, method=cast("Any", name), rtol=rtol, atol_angle=None)
+    # Steps of other systems end at their rows, so that other rows would be another run.
+    rows = {"output_step": system.end / ROWS} if isinstance(system, Scene) else {}
+    sampled = replace(system, solver=solver, **rows)
     try:
         result = run_to_end(sampled, seconds=limit)
         status, message = OK if result.succeeded else result.status, result.message
@@ -225,35 +250,33 @@ def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int 
         if status == OUT_OF_TIME:
             result, status, message = error.result, CUT_OFF, f"cut off after {limit:g} s"
         if result is None:
-            return replace(refused_trial(name, rtol, scene, message), status=status)
+            return replace(refused_trial(name, rtol, system, message), status=status)
     if status == "interrupted":  # by the user
         raise RunError(message, status=status, result=result)
-    counters = result.counters
-    if repeats and status == OK and counters.wall_time < QUICK:
-        unsampled = replace(scene, solver=solver, output_step=None)
-        seconds = min(simulate(unsampled).counters.wall_time for _ in range(repeats))
-        counters = replace(counters, wall_time=seconds)
-    history = result.history
+    work = result.work
+    seconds = work["wall_time"]
+    if repeats and status == OK and seconds < QUICK:
+        unsampled = replace(sampled, output_step=None) if rows else sampled
+        seconds = min(simulate(unsampled).work["wall_time"] for _ in range(repeats))
     return Trial(
         method=name,
         rtol=rtol,
         status=status,
-        seconds=counters.wall_time,
-        reached=scene.end if status == OK else float(history.time[-1]),
-        end=scene.end,
-        newton=counters.newton_iterations,
-        evaluations=counters.evaluations,
-        steps=counters.steps,
-        force=history.top_force[:, :2],
-        sliding=history.sliding,
+        seconds=seconds,
+        reached=system.end if status == OK else float(result.time[-1]),
+        end=system.end,
+        newton=int(work["newton_iterations"]),
+        evaluations=int(work.get("evaluations", 0)),
+        steps=int(work["steps"]),
+        histories=result.compared,
         message=message,
     )
 
 
-def dopri5_cost(scene: Scene) -> tuple[str, ...]:
+def dopri5_cost(system: System) -> tuple[str, ...]:
     """The cost of the method of PEER 2017/07 as text, extrapolated from half a second of wall time."""
     try:
-        trial = run_native("dopri5", scene, 1e-3, 0.5, repeats=0)
+        trial = run_native("dopri5", system, 1e-3, 0.5, repeats=0)
     except InputError as error:
         return (f"dopri5 cannot run this scene: {error}",)
     if trial.finished:

@@ -256,7 +256,6 @@ def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.Cap
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["run", "--error", "1%"], "--error = 0.01: this has more than one bearing"),
         (["animate", "-o", "x.gif", "--end", "9"], "time = 9 s: the run holds 0 to 0.24 s"),
         (["fit", "test.csv", "--parameters", "bearing.friction"], "give a scene of one bearing here"),
         (["plot", "--figure", "loops"], "--figure = 'loops': give one of overview, plan"),

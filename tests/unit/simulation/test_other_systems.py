@@ -20,6 +20,7 @@ from msfp_gen.scene.file.loader import scene_from_table, scene_text
 from msfp_gen.scene.system import GROUP, Kind, OtherSystem, kinds
 from msfp_gen.simulation.bearing_run import start_bearing
 from msfp_gen.studies import read_study
+from msfp_gen.studies.accuracy import simulate_within
 
 
 @dataclass(frozen=True)
@@ -121,3 +122,8 @@ def test_what_it_has_not_is_one_line(file: Path) -> None:
         kinds.cache_clear()
         sys.path.remove(str(file.parent))
         load_scene(file)
+
+
+def test_an_error_cannot_be_asked_without_a_tolerance(file: Path) -> None:
+    with pytest.raises(InputError, match="two: errors of this system cannot be measured, since it has no field solver"):
+        simulate_within(load_scene(file), 0.01)

@@ -8,16 +8,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import scene_of, thinned
+from support import buildings, scene_of, thinned
 
-from msfp_gen import Auto, Effects, InputError, Motion, RunError, Solver, Stop, load_scene
+from msfp_gen import Auto, Effects, InputError, Motion, RunError, Solver, Stop, load_scene, simulate
 from msfp_gen.cli import main
 from msfp_gen.studies.accuracy import study, work_precision
 from msfp_gen.studies.accuracy.methods import METHODS, methods_named
-from msfp_gen.studies.accuracy.study import Point, Study, confirming_reruns, is_wrong, run_tolerances, without_stop
+from msfp_gen.studies.accuracy.study import (
+    Point,
+    Study,
+    confirming_reruns,
+    is_wrong,
+    model_errors,
+    run_tolerances,
+    without_stop,
+)
 from msfp_gen.studies.accuracy.timed_run import (
     CUT_OFF,
-    ERRORS,
     OK,
     REFUSED,
     ROWS,
@@ -26,10 +33,12 @@ from msfp_gen.studies.accuracy.timed_run import (
     best_reference,
     comparison_times,
     errors,
+    of_bearing,
 )
 
 TIME = comparison_times(1.0)
 FAMILIES = {"a": "a", "b": "b", "c": "a"}
+QUANTITIES = ("bearing_displacement", "base_shear", "floor_acceleration", "drift")  # of a building
 
 
 def trial(method="a", rtol=1e-3, wave=0.0, status=OK, rows=ROWS + 1, **changes):
@@ -47,8 +56,7 @@ def trial(method="a", rtol=1e-3, wave=0.0, status=OK, rows=ROWS + 1, **changes):
         newton=5,
         evaluations=9,
         steps=3,
-        force=force,
-        sliding=sliding,
+        histories=of_bearing(force, sliding),
     )
     return replace(made, **changes)
 
@@ -65,20 +73,20 @@ def small():
 
 def test_errors_are_relative_to_the_peaks_of_the_reference():
     found = errors(trial(wave=0.01), trial())
-    assert found.force_max == pytest.approx(0.01, rel=1e-3) and found.sliding_max == pytest.approx(0.01, rel=1e-3)
+    assert found["force"].max == pytest.approx(0.01, rel=1e-3) and found["sliding"].max == pytest.approx(0.01, rel=1e-3)
     rms = np.sqrt(np.mean((0.01 * np.sin(40 * TIME)) ** 2))
-    assert found.force_rms == pytest.approx(rms) and found.sliding_rms == pytest.approx(rms)
-    assert set(ERRORS) < set(found.as_dict()) and found.force_peak < 1e-2
+    assert found["force"].rms == pytest.approx(rms) and found["sliding"].rms == pytest.approx(rms)
+    assert {"force_max", "force_rms", "sliding_max"} < set(found.as_dict()) and found["force"].peak < 1e-2
 
 
 def test_a_run_that_ended_early_is_compared_as_far_as_it_came():
-    assert errors(trial(rows=300, wave=0.01), trial()).force_max == pytest.approx(0.01, rel=1e-2)
+    assert errors(trial(rows=300, wave=0.01), trial())["force"].max == pytest.approx(0.01, rel=1e-2)
     assert errors(trial(rows=0), trial()) is None
 
 
 def test_a_bearing_at_rest_has_no_relative_error():
-    still = trial(force=np.zeros((ROWS + 1, 2)))
-    with pytest.raises(InputError, match="did not move"):
+    still = trial(histories=of_bearing(np.zeros((ROWS + 1, 2)), np.ones((ROWS + 1, 2))))
+    with pytest.raises(InputError, match="nothing moved"):
         errors(trial(), still)
 
 
@@ -86,15 +94,14 @@ def test_the_reference_is_of_two_families_that_agree():
     runs = [trial("a", 1e-6), trial("c", 1e-9, 1e-7), trial("b", 1e-5, 1e-4), trial("b", 1e-2, 1e-9)]
     found = best_reference(runs, FAMILIES)
     assert (found.trial.method, found.second.method, found.second.rtol) == ("c", "b", 1e-5)
-    assert found.floor.force_max == pytest.approx(1e-4, rel=1e-2)
+    assert found.floor["force"].max == pytest.approx(1e-4, rel=1e-2)
 
 
 def test_one_family_alone_confirms_little():
     found = best_reference([trial("a", 1e-6, 1e-3), trial("c", 1e-9)], FAMILIES)
     assert (found.trial.method, found.second.method, found.independent) == ("c", "a", False)
-    assert (
-        found.floor.force_max == pytest.approx(1e-3, rel=1e-2) and "own family alone" in study.reference_notes(found)[0]
-    )
+    assert found.floor["force"].max == pytest.approx(1e-3, rel=1e-2)
+    assert "own family alone" in study.reference_notes(found)[0]
     found = best_reference([trial("a", 1e-6), trial("a", 1e-4, 1e-2), trial("a", 1e-5, 1e-3)], FAMILIES)
     assert (found.second.rtol, found.independent) == (1e-5, False)
     found = best_reference([trial("a")], FAMILIES)
@@ -136,7 +143,7 @@ def test_runs_are_cut_off_and_tighter_ones_left_out():
     trials, notes = run_tolerances(METHODS["dopri5"], scene, [1e-2, 1e-3, 1e-4], 0.01, lambda line: None)
     assert [t.status for t in trials] == [CUT_OFF] * 2 and "tighter than 0.001 was not tried" in notes[0]
     assert 0 < trials[0].reached < scene.end and trials[0].expected_seconds > 10 * trials[0].seconds
-    assert len(trials[0].force) < ROWS
+    assert trials[0].rows < ROWS
 
 
 def test_libraries_are_cut_off_too():
@@ -159,7 +166,7 @@ def test_every_library_method_gives_the_same_motion(name):
     scene = short("fenz-monotonic", 0.06, stop=None)
     tight = METHODS["implicit"].attempt(scene, 1e-9, 20.0)
     found = METHODS[name].attempt(scene, 1e-5, 30.0)
-    assert found.finished and found.newton > 0 and len(found.force) == ROWS + 1
+    assert found.finished and found.newton > 0 and found.rows == ROWS + 1
     assert errors(found, tight).worst_rms < 1e-4
 
 
@@ -292,3 +299,32 @@ def test_effects_are_fixed_for_all_runs():
     found = work_precision(scene, methods=["implicit", "Radau"], tolerances=[1e-2], limit=20.0)
     assert isinstance(found.scene.effects, Effects) and found.scene.effects.sliders == "inertial"
     assert {point.trial.status for point in found.points} == {OK}
+
+
+def swaying():
+    """A frame of storeys on its bearings, which slide."""
+    motion = Motion.harmonic(0.05, 0.6, direction=0.4, cycles=1)
+    return buildings.scene(buildings.frame(), motion=motion, duration=0.5, output_step=0.01)
+
+
+def test_errors_of_a_building_are_those_of_its_own_rows():
+    """The error of a run against a much tighter one, by the histories of the results, is the one that is stated."""
+    scene = swaying()
+    found = work_precision(scene, methods=["implicit", "esdirk4"], tolerances=[1e-2, 1e-4], limit=60.0)
+    assert set(found.shown) == {f"{name}_rms" for name in QUANTITIES}
+    loose, exact = (simulate(replace(scene, solver=replace(scene.solver, rtol=rtol))) for rtol in (1e-2, 1e-7))
+    away = np.linalg.norm((loose.bearing_displacement - exact.bearing_displacement)[:, :, :2], axis=2)
+    peak = np.linalg.norm(exact.bearing_displacement[:, :, :2], axis=2).max()
+    stated = found.of("implicit")[0]
+    assert stated.errors["bearing_displacement"].max == pytest.approx(away.max() / peak, rel=0.1)
+    assert stated.trial.steps == loose.work["steps"] and stated.trial.newton == loose.work["newton_iterations"]
+    assert found.of("esdirk4")[0].errors.worst_rms < 0.05 and "storey" not in study.summary_line(found)
+    assert "bearing displacement, base shear, floor acceleration and drift" in study.cost_table(found).columns[2]
+
+
+def test_simpler_models_of_a_building():
+    found = model_errors(swaying(), tolerances=[1e-3], limit=60.0)
+    notes = " ".join(found.notes)
+    assert "planar: left out" in notes and "OpenSees: left out; this method runs one bearing alone" in notes
+    own, without = (found.of(name)[0].errors.worst_rms for name in ("as it stands", "no rims"))
+    assert without == pytest.approx(own, rel=1e-3)  # no slider comes near its rim

@@ -88,13 +88,13 @@ def test_linearised_rim_is_a_spring():
 def test_linearised_run_is_near_the_full_one():
     scene = short("fenz-test3", 60.0)
     found = errors(run_series(scene, 400, arms=True), METHODS["implicit"].attempt(scene, 1e-4, 10.0))
-    assert found.force_rms < 0.04 and found.sliding_rms < 0.04
+    assert found["force"].rms < 0.04 and found["sliding"].rms < 0.04
 
 
 def test_linearised_mass_follows_the_full_one_while_it_slides():
     scene = replace(plain_scene("ridgecrest-clc"), duration=10.0)
     found = errors(run_series(scene, 1000, arms=True), METHODS["implicit"].attempt(scene, 1e-3, 20.0))
-    assert found.force_rms < 0.08 and found.force_peak < 0.05
+    assert found["force"].rms < 0.08 and found["force"].peak < 0.05
 
 
 def test_linearised_bearing_needs_something_to_be_driven_by():
@@ -165,11 +165,11 @@ def test_a_motion_in_two_directions_is_run_axis_by_axis():
     scene = short("becker-circle-50", 12.0)
     found = NAMED["planar"].run(scene, 1e-3, 20.0)
     full = run_native("implicit", scene, 1e-3, 20.0)
-    assert found.status == OK and found.newton > full.newton and len(found.force) == ROWS + 1
-    assert errors(found, full).force_rms > 0.05  # friction does not act axis by axis
+    assert found.status == OK and found.newton > full.newton and found.rows == ROWS + 1
+    assert errors(found, full)["force"].rms > 0.05  # friction does not act axis by axis
     one = replace(scene, effects=replace(scene.effects, dimension="planar"), motion=methods._along(scene.motion, 0))
     alone = simulate(replace(one, motion_table=None, output_step=12.0 / ROWS, solver=replace(scene.solver, rtol=1e-3)))
-    assert found.force[:, 0] == pytest.approx(alone.history.top_force[: ROWS + 1, 0], abs=1.0)
+    assert found.histories["force"][:, 0, 0] == pytest.approx(alone.history.top_force[: ROWS + 1, 0], abs=1.0)
 
 
 def test_a_rocking_base_has_no_planar_parts():
@@ -220,14 +220,14 @@ def test_opensees_is_given_the_bearing(fake):
     assert words[14:17] == pytest.approx((0.0215 / 0.076 * 0.053, *(0.065 / 0.473 * 0.435,) * 2))
     assert words[17] == W and found.status == OK and found.steps == 50
     u = scene.motion.displacement(1.0)[0] - scene.motion.displacement(0.0)[0]
-    assert found.force[-1] == pytest.approx([1e5 * u, 0.0])
+    assert found.histories["force"][-1, 0] == pytest.approx([1e5 * u, 0.0])
     assert "wipe" in ops.calls
 
 
 def test_opensees_that_fails_is_a_failure(fake):
     fake(last=20)
     found = series.run_opensees(short(duration=1.0), 50)
-    assert found.status == "failed" and found.reached == pytest.approx(0.4) and len(found.force) == 801
+    assert found.status == "failed" and found.reached == pytest.approx(0.4) and found.rows == 801
 
 
 @pytest.mark.parametrize(
@@ -256,7 +256,7 @@ def test_opensees_agrees_with_the_linearised_bearing():
         pytest.skip("OpenSeesPy cannot be imported")
     scene = without_stop(load_scene("fenz-test3"))
     found = errors(series.run_opensees(scene, 1000), run_series(scene, 1000))
-    assert found.force_rms < 0.05
+    assert found["force"].rms < 0.05
 
 
 @pytest.mark.slow
