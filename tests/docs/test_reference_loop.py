@@ -32,7 +32,8 @@ def difference(scene, end, step, capsys):
     return np.linalg.norm((forces - found)[:, :2], axis=1).max() / size
 
 
-@pytest.mark.parametrize(("end", "step"), [(2.5, 5e-3), pytest.param(8.0, 4e-3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("end", "step"), [(2.5, 5e-3), (8.0, 4e-3)])
 def test_test_2_of_chapter_4_is_that_of_simulate(end, step, capsys):
     """First sliding, and with the longer one also the turn and the way back."""
     assert difference(load_scene("fenz-test2"), end, step, capsys) < 1e-3

@@ -126,7 +126,6 @@ def assert_as_python(output: str, expected: Array) -> None:
         np.testing.assert_allclose(rows[:, column], expected[:, column], atol=0.51 * 10.0**-digits, rtol=0)
 
 
-@pytest.mark.slow
 @needs("make", "pkg-config")
 def test_the_c_example_links_two_layouts_and_runs_as_python_does(prefix: Path, expected: Array) -> None:
     folder = prefix / "share/msfp/examples"

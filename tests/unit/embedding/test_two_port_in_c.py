@@ -18,6 +18,7 @@ from msfp_gen.embedding import values
 from msfp_gen.jit.compiler import find_compiler
 from msfp_gen.model.compiled import bodies_and_surfaces, top_values
 
+pytestmark = pytest.mark.slow  # a library of its own, compiled for a quarter of a minute
 PROGRAM = ROOT / "tests" / "support" / "c" / "two_port.c"
 STRICT = ("-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic")
 STEP, COUNT = 0.02, 40
