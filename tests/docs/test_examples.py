@@ -36,7 +36,7 @@ def test_bearing_is_the_preset(name):
         np.testing.assert_allclose(found.arrays()[key], values, rtol=1e-12, err_msg=key)
 
 
-@pytest.mark.parametrize("name", thinned(BEARINGS, lambda name: name not in ("triple", "quintuple")))
+@pytest.mark.parametrize("name", thinned(BEARINGS, lambda name: name in ("single", "double")))
 def test_example_runs_as_its_name_says(name):
     scene = load_scene(EXAMPLES / f"{name}.toml")
     assert scene.name == name
@@ -54,6 +54,7 @@ def test_command_in_the_header_is_right(name):
     assert f"#     msfp-gen run examples/{name}.toml --plot {name}.png\n" in text
 
 
+@pytest.mark.slow
 def test_the_example_of_a_building_stays_within_the_limits_of_its_bearings() -> None:
     path = EXAMPLES / "building" / "building.toml"
     scene = load_scene(path)

@@ -159,6 +159,7 @@ def twin(**values: float) -> Bearing:
     return a_stack((3, 1, 1), [1.0, 1.0], capacity=0.05, rim_stiffness=1e7, **values)
 
 
+@pytest.mark.slow
 def test_all_rims_at_once_slowly() -> None:
     """Full capacity, both rims within a twentieth of a millimetre of each other (weights differ), and back."""
     run = pushed(twin(), [0.108, 0.0], tilt=1e10, speed=5e-3, rtol=1e-5)

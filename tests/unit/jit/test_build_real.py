@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from msfp_gen import Layout, build_model
-from msfp_gen.jit.build import BuildInfo, generate_to, prepare
+from msfp_gen.jit.build import BuildInfo, generate_to
+from msfp_gen.jit.cache import Entry
 from msfp_gen.specification.layout import ModelSpec
 
 WARM = """
@@ -49,5 +50,5 @@ def test_generated_folder_serves_a_plain_script(built: BuildInfo, tmp_path: Path
 
 
 def test_layouts_and_effects_have_entries_of_their_own(built: BuildInfo) -> None:
-    other = prepare(ModelSpec(Layout(2, 1, 0)))
+    other = Entry.of(ModelSpec(Layout(2, 1, 0)))
     assert other.folder != built.folder and other.module == "msfp_2_1_0"

@@ -150,7 +150,7 @@ def run_program(folder: Path, place: Path, *flags: str) -> str:
 @pytest.fixture(scope="module")
 def printed(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Array]:
     """What the C program prints: one array of rows a name; the text of its status apart."""
-    output = run_program(folder, tmp_path_factory.mktemp("programs") / "all")
+    output = run_program(folder, tmp_path_factory.mktemp("programs") / "all", "-O0")
     rows: dict[str, list[list[float]]] = {}
     *lines, last = output.splitlines()
     assert last == "status ok", output[-500:]
