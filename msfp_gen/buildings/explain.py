@@ -9,7 +9,6 @@ import numpy as np
 from msfp_gen.buildings.notes import building_doubts
 from msfp_gen.buildings.scene import BuildingScene, remaining_loads, standing_below
 from msfp_gen.common.tables import Table, vector
-from msfp_gen.scene.effect_selection import doubtful_values
 from msfp_gen.scene.explain import (
     body_table,
     doubt_tables,
@@ -21,6 +20,7 @@ from msfp_gen.scene.explain import (
     surface_table,
     top_table,
 )
+from msfp_gen.scene.plausibility import doubtful_values
 from msfp_gen.scene.standing import unsteady
 
 LISTED = 12  # frequencies of the building in its table, at most

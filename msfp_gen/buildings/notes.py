@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -13,8 +14,20 @@ from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.note import RISING, Note
-from msfp_gen.scene.effect_selection import LEAST_DAMPING, USUAL_DAMPING, doubtful_values, ringing, unread_values
 from msfp_gen.scene.fidelity import UNSEEN
+from msfp_gen.scene.plausibility import (
+    LEAST_DAMPING,
+    OF_BEARING,
+    OF_RUN,
+    USUAL_DAMPING,
+    Check,
+    Reading,
+    Subject,
+    doubtful_values,
+    judged,
+    ringing,
+    unread_values,
+)
 from msfp_gen.scene.standing import unsteady
 from msfp_gen.specification.layout import Auto
 
@@ -47,10 +60,11 @@ def notes_of(scene: BuildingScene, monitored: Sequence[Note], error: float, time
 
 
 def _shared(notes: Sequence[Note]) -> list[Note]:
-    """The notes on values, with one note, of the first bearing, for all that have the same doubtful value."""
-    alike: dict[str, list[Note]] = {}
+    """The notes on values, with one note, of the first bearing, for all that have such a value at the same place."""
+    alike: dict[tuple[int, str], list[Note]] = {}
     for note in notes:
-        alike.setdefault(note.text.partition(":")[0], []).append(note)
+        words = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "", note.text.partition(":")[0])  # values may differ
+        alike.setdefault((note.surface, words), []).append(note)
     return [_with_others(group[0], group) for group in alike.values()]
 
 
@@ -101,8 +115,57 @@ class Floor(NamedTuple):
     gyration: float
 
 
+def _damping(building: Building) -> Iterator[Reading]:
+    """Damping ratio of the first mode on a fixed base."""
+    fixed = building.fixed
+    if len(fixed.frequencies) and fixed.frequencies[0] > 0:
+        mode = fixed.modes[:, 0]
+        ratio = mode @ building.damping[np.ix_(fixed.inner, fixed.inner)] @ mode / (2 * fixed.frequencies[0])
+        yield Reading(0, float(ratio), float(ratio))
+
+
+def _frequency(building: Building) -> Iterator[Reading]:
+    """Lowest frequency on a fixed base [Hz]."""
+    if len(building.frequencies):
+        yield Reading(0, float(building.frequencies[0]), float(building.frequencies[0]))
+
+
+OF_BUILDING = (
+    Check(
+        _damping,
+        (-np.inf, 0.2),
+        "building.damping_ratio: the first mode on a fixed base has {value:.3g} of critical damping; is it a fraction, "
+        "such as 0.05 for 5 per cent?",
+    ),
+    Check(
+        _frequency,
+        (0.05, np.inf),
+        "building: the lowest frequency on a fixed base is {value:.3g} Hz; are stiffnesses in N/m and N m/rad, of "
+        "torsion and rocking too?",
+    ),
+)
+"""Checks of a superstructure."""
+
+
+def _of_run(scene: BuildingScene) -> Subject:
+    """What is judged of the run of a building: the bearing with the largest load at rest, ground and limits."""
+    heaviest = int(np.argmax(scene.axial_loads))
+    bearing, load = scene.bearings[heaviest].bearing, float(scene.axial_loads[heaviest])
+    return Subject(bearing, load, motion=scene.first_ground, limits=scene.limits)
+
+
+def refusals(scene: BuildingScene) -> list[str]:
+    """The texts of the doubts about values that no unit can make right, each once for all bearings of one kind."""
+    found = [text for (_, _, text), refused in judged(OF_RUN, _of_run(scene)) if refused]
+    kinds = {mount.bearing: float(load) for mount, load in zip(scene.bearings, scene.axial_loads, strict=True)}
+    for bearing, load in kinds.items():
+        found += [text for (_, _, text), refused in judged(OF_BEARING, Subject(bearing, load)) if refused]
+    return found
+
+
 def building_doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
     """Doubtful values of a building: 0 (no surface), the value, and the text of the doubt with the likely unit."""
+    yield from (doubt for doubt, _ in (*judged(OF_RUN, _of_run(scene)), *judged(OF_BUILDING, scene.building)))
     yield from _floor_doubts(scene)
     yield from _storey_doubts(scene.building, scene.gravity)
     springs = np.array([mount.interface.vertical_stiffness for mount in scene.bearings])

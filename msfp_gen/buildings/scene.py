@@ -344,6 +344,12 @@ class BuildingScene(OtherSystem):
 
         return quantities(self)
 
+    def refusals(self) -> list[str]:
+        """Why values can hardly be meant, as of `scene.plausibility.refusals`."""
+        from msfp_gen.buildings.notes import refusals
+
+        return refusals(self)
+
     def columns(self) -> Places:
         """The columns of a table of all rows, as of `results.dataset.columns`."""
         from msfp_gen.buildings.dataset import columns

@@ -11,6 +11,7 @@ import typer
 
 from msfp_gen.cli.console import (
     AsJson,
+    Force,
     Progress,
     SceneName,
     Workers,
@@ -21,6 +22,7 @@ from msfp_gen.cli.console import (
     note,
     note_exceeded,
     note_written,
+    require_meant,
     result_of,
     say,
     show,
@@ -90,6 +92,7 @@ def bound(
         typer.Option(metavar="RECORD", help="A record of the suite that is not run and in no mean; may be repeated."),
     ] = None,
     workers: Workers = None,
+    force: Force = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a scene at lower bound, nominal and upper bound properties, of its data sheet or by factors of a code.
@@ -97,7 +100,7 @@ def bound(
     Under a suite, -o keeps the numbers of each run as it ends: the same command continues where it was interrupted.
     """
     if suite is not None:
-        _bound_suite(scene, factors, output, suite, leave_out or (), workers, as_json)
+        _bound_suite(scene, factors, output, suite, leave_out or (), workers, force, as_json)
         return
     if leave_out or workers is not None:
         raise InputError(f"--{'leave-out' if leave_out else 'workers'}: it is for the runs of a suite; give --suite")
@@ -108,6 +111,7 @@ def bound(
 
     chosen = load_scene(scene)
     table = module.factors_of(chosen) if factors is None else load_factors(factors)
+    require_meant(chosen, force)
     module.bounded_scenes(chosen, table)  # refuses a table that does not fit the bearing before anything is written
     if output is not None:
         make_folder(output, "--output")
@@ -146,18 +150,21 @@ def _bound_suite(
     suite: Path,
     leave_out: Sequence[str],
     workers: int | None,
+    force: bool,
     as_json: bool,
 ) -> None:
     """`bound` under every motion of a suite: numbers and the figure, without the rows in time of the runs."""
     from msfp_gen.common.output import make_folder
     from msfp_gen.scene.file.source import load_scene
-    from msfp_gen.studies.bounding import factors_of
+    from msfp_gen.studies.bounding import CASES, factors_of
     from msfp_gen.studies.bounding import suite as module
 
     chosen = factors_of(load_scene(scene)).name if factors is None else factors
     with Progress("suite") as progress:
         study = module.suite_study(scene, suite, chosen, progress)
     module.check_left_out(leave_out, study)
+    for run in range(len(CASES), study.runs + 1, len(CASES)):
+        require_meant(study.scene(run), force)
     if output is not None:
         make_folder(output, "--output")
     build(study.scene(1))

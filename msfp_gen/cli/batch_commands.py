@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import (
+    Force,
     Progress,
     SceneName,
     Workers,
@@ -22,6 +23,7 @@ from msfp_gen.cli.console import (
     note_written,
     number,
     numbers,
+    require_meant,
     say,
     scenes,
     show,
@@ -67,6 +69,7 @@ def batch(
         typer.Option(metavar="FILE", help="Write one row for each run, varied fields included: .csv or .parquet."),
     ] = None,
     workers: Workers = None,
+    force: Force = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print summaries and varied fields as JSON, and nothing else.")
     ] = False,
@@ -82,6 +85,8 @@ def batch(
     with Progress("suite") as progress:
         records = () if suite is None else load_suite(suite, progress).records
     chosen = [variation for source in sources for variation in variations(source, fields, records)]
+    for variation in chosen:
+        require_meant(variation.scene, force)
     rows: list[Row] = []
     with _reported(rows, len(chosen), table, as_json):
         _run(chosen, workers, output, rows)

@@ -274,12 +274,27 @@ def build(scene: System, gradients: bool = False) -> None:
             build_model(spec.layout, spec.effects, gradients, progress=progress)
 
 
-def run_scene(scene: Any, **options: Any) -> tuple[Any, RunError | None]:
-    """Run a scene; its result (of a failed run as far as it was computed), and the error of a failed run."""
+Force = Annotated[bool, typer.Option("--force", help="Run also with values that no unit can make right.")]
+
+
+def require_meant(scene: System, force: bool = False) -> None:
+    """Raise InputError for a value that is a thousand times off, unless `force`."""
+    from msfp_gen.scene.plausibility import refusals
+
+    if not force and (found := refusals(scene)):
+        raise InputError(f"{'; '.join(found)} (`msfp-gen run`, `batch` and `bound` accept it with --force)")
+
+
+def run_scene(scene: Any, force: bool = False, **options: Any) -> tuple[Any, RunError | None]:
+    """Run a scene; its result (of a failed run as far as it was computed), and the error of a failed run.
+
+    force: as of `require_meant`.
+    """
     from msfp_gen.scene.scene import Scene
     from msfp_gen.simulation.memory import require_memory
     from msfp_gen.simulation.simulate import simulate
 
+    require_meant(scene, force)
     if isinstance(scene, Scene):
         require_memory([scene])
     build(scene)

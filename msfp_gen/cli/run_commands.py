@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from msfp_gen.cli.console import (
+    Force,
     Output,
     Progress,
     SceneName,
@@ -22,6 +23,7 @@ from msfp_gen.cli.console import (
     note_written,
     number,
     parser_of,
+    require_meant,
     run_scene,
     say,
     show,
@@ -205,6 +207,7 @@ def run(
     checkpoint: CheckpointFile = None,
     every: Every = None,
     resume: ResumeFile = None,
+    force: Force = False,
 ) -> None:
     """Simulate a scene."""
     checkpoints = CheckpointOptions.of(checkpoint, every, resume)
@@ -219,7 +222,7 @@ def run(
     from msfp_gen.scene.file.source import load_scene
 
     chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
-    note_written(_run(chosen, output, plot, as_json, checkpoints, target, strict))
+    note_written(_run(chosen, output, plot, as_json, checkpoints, target, strict, force))
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen demo -o out")
@@ -259,12 +262,14 @@ def _run(
     checkpoints: CheckpointOptions = NO_CHECKPOINT,
     target: ErrorTarget | None = None,
     strict: bool = False,
+    force: bool = False,
 ) -> list[Path]:
     """Simulate, print and save; returns the paths. A failed run is printed and saved before its error is raised."""
+    require_meant(scene, force)
     within = None if target is None else target.simulate(scene)
     options = {"strict": strict} | checkpoints.arguments
     with checkpoints.hint_on_write_error():
-        result, failure = run_scene(scene, **options) if within is None else (within.result, None)
+        result, failure = run_scene(scene, force, **options) if within is None else (within.result, None)
     saved: list[Path] = []
     if result is not None:
         _report(result, as_json, {} if within is None else {"accuracy": within.as_dict()})

@@ -24,7 +24,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 from msfp_gen.common.errors import InputError
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_TERM = r"[A-Za-zµμ°%_]+(?:(?:\^|\*\*)-?\d)?[²³]?"
+_TERM = r"[A-Za-zµμ°%_]+(?:(?:\^|\*\*)-?\d|[234])?[²³]?"
 _PRODUCT = rf"{_TERM}(?:\s*[*·⋅]\s*{_TERM}|\s+{_TERM})*"
 _FACTOR = rf"(?:\s*[*/·⋅]\s*{_TERM}|\s+{_TERM}|\s*/\s*\(\s*{_PRODUCT}\s*\))"
 _TEXT = re.compile(rf"\s*({_NUMBER})\s*((?:1\s*/\s*)?{_TERM}{_FACTOR}*)?\s*")
@@ -70,7 +70,7 @@ def to_si(text: str, unit: str) -> float:
 def _convert(number: float, unit_text: str, unit: str, remedy: str) -> float:
     import pint
 
-    name = unit_text
+    name = re.sub(r"(?<=[A-Za-zµμ])[234]", r"^\g<0>", unit_text)  # "cm/s2"
     if unit == "m/s^2":
         name = re.sub(r"[A-Za-z_]+", lambda word: _ACCELERATION_NAMES.get(word[0], word[0]), name)
     try:

@@ -90,6 +90,8 @@ IMPORTANCE = (
     ),
 )
 """Kinds of notes, those first that question most of the results."""
+DECISIVE = IMPORTANCE[: IMPORTANCE.index("rims") + 1]
+"""Kinds of notes that are always printed: results may not be used before they are read."""
 RISING = ("rims", "footprint", "inertia", "heat", "law_speed")
 """Kinds of notes with one limit, from above."""
 

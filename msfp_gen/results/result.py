@@ -26,7 +26,7 @@ from msfp_gen.results.characterise import characterise as characterise_bearing
 from msfp_gen.results.files import Storage, read_result
 from msfp_gen.results.gradients import Gradients
 from msfp_gen.results.history import Counters, Event, Extremes, History
-from msfp_gen.results.note import Note, by_importance
+from msfp_gen.results.note import DECISIVE, Note, by_importance
 from msfp_gen.results.summary import (
     rows_of_bearing,
     summarise,
@@ -45,7 +45,7 @@ from msfp_gen.specification.layout import Effects
 if TYPE_CHECKING:
     import xarray as xr
 
-MAX_NOTES = 3  # printed, the most important ones; the others are counted
+MAX_NOTES = 3  # printed, unless more are decisive; the others are counted
 MAX_POINTS = 600  # of the curve
 WIDTH, HEIGHT, MARGIN = 320, 200, 8  # of the curve [px]
 Rows = list[tuple[str, str]]  # label and value
@@ -198,9 +198,11 @@ class AnyResult(ABC):
 
     @property
     def first_notes(self) -> tuple[list[str], int]:
-        """The lines of the most important notes, `MAX_NOTES` at most, and how many others there are."""
-        lines = [note.line for note in by_importance(self.notes)]
-        return lines[:MAX_NOTES], max(0, len(lines) - MAX_NOTES)
+        """The lines of decisive notes, of others up to `MAX_NOTES` in all, and how many more there are."""
+        notes = by_importance(self.notes)
+        decisive = sum(note.kind in DECISIVE and not note.action for note in notes)
+        shown = max(decisive, MAX_NOTES)
+        return [note.line for note in notes[:shown]], max(0, len(notes) - shown)
 
     def __repr__(self) -> str:
         """The main results in ten lines at most."""

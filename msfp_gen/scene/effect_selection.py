@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,9 +12,7 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.later import kept
 from msfp_gen.scene.planarity import scene_plane
-from msfp_gen.scene.standing import standing_of, unsteady
-from msfp_gen.scene.top import MassTop, RigTop, Top, load_values, sprung_mass
-from msfp_gen.specification import contract
+from msfp_gen.scene.top import MassTop, RigTop, Top, load_values
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
@@ -77,93 +74,6 @@ def turned_or_pushed(scene: SceneFields) -> bool:
     """Whether base or top rotate, or a load history has other components than the vertical one."""
     turned = scene.top_rotation is not None or np.any(scene.motion.coefficients[:, 3:])
     return bool(turned or (scene.load is not None and np.any(scene.load.coefficients[:, [0, 1, 3, 4, 5]])))
-
-
-LARGEST_FRICTION = 0.3  # of sliding materials in bearings, with a margin
-RADII = (0.05, 20.0)  # of sliding surfaces [m]
-LEAST_DAMPING = 0.01  # ratio of a vibration on vertical springs below which what it adds depends on the tolerance
-USUAL_DAMPING = 0.02  # ratio that is named as the remedy
-LARGEST_TILT = 0.5  # sliding capacity over radius; beyond it a slider tilts by more than 28 degrees
-RIM_LOAD = 1 / 3  # of the load at rest, which a rim must bear
-SOFTEST_RIM = 0.5  # compression of a rim by this load, over the capacity
-
-
-def scene_doubts(scene: SceneFields) -> Iterator[tuple[int, float, str]]:
-    """Doubts about values of the bearing of a scene, and about the springs that hold its top plate up."""
-    yield from doubtful_values(scene.bearing, 0.0 if scene.effects.rims is False else load_at_rest(scene))
-    yield from unread_values(scene.bearing, scene.effects)
-    if standing := standing_of(scene):
-        yield from unsteady(*standing[:3])
-    if (mass := sprung_mass(scene.top)) and isinstance(scene.top, MassTop):
-        turn = np.sqrt((scene.top.vertical_stiffness or 0.0) / mass)
-        damping = scene.top.vertical_damping
-        ratio, cure = damping / (2 * turn * mass), 2 * USUAL_DAMPING * turn * mass
-        if ratio < LEAST_DAMPING:
-            name, what = "top.vertical_damping", "the mass vibrates on its vertical spring"
-            yield 0, ratio, ringing(name, damping, what, turn, ratio, cure)
-
-
-def ringing(path: str, damping: float, what: str, turn: float, ratio: float, cure: float) -> str:
-    """The text of a doubt about a vibration that rings on.
-
-    path: of the damping in messages. damping: its value [N s/m]. what: the part that vibrates. turn: its circular
-    frequency [rad/s]. ratio: its damping ratio [-]. cure: damping with which it has `USUAL_DAMPING` [N s/m].
-    """
-    return (
-        f"{path} = {damping:g}: {what} at {turn / (2 * np.pi):.3g} Hz with {ratio:.1%} of critical damping and rings "
-        f"on: accelerations and rotations depend on the tolerance by several per cent; give {cure:.3g} N s/m for "
-        f"{USUAL_DAMPING:.0%}"
-    )
-
-
-def doubtful_values(bearing: Bearing, load: float = 0.0) -> Iterator[tuple[int, float, str]]:
-    """Values that are unlikely: number of the surface, the value, and the text of the doubt with the likely slip.
-
-    load: at rest, which rims must be able to stop [N]; 0: not known, or there are no rims.
-    """
-    for number, surface in enumerate(bearing.surfaces, start=1):
-        path = f"bearing.surfaces[{number - 1}]"
-        if surface.friction > LARGEST_FRICTION:
-            text = f"{path}.friction = {surface.friction:g} is unusually high; a fraction is meant, not per cent"
-            yield number, surface.friction, text
-        if not RADII[0] <= surface.radius <= RADII[1]:
-            text = f"{path}.radius = {surface.radius:g} m is outside {RADII[0]:g} to {RADII[1]:g} m; is it in metres?"
-            yield number, surface.radius, text
-        if surface.capacity > LARGEST_TILT * surface.radius:
-            text = (
-                f"{path}.capacity = {surface.capacity:g} m tilts the slider by "
-                f"{surface.capacity / surface.radius:.2g} rad; is it the displacement along the surface, in metres?"
-            )
-            yield number, surface.capacity, text
-        if surface.yield_displacement > 0.1 * surface.capacity:
-            text = (
-                f"{path}.yield_displacement = {surface.yield_displacement:g} m is more than a tenth of the capacity; "
-                "usual are 0.1 to 1 mm"
-            )
-            yield number, surface.yield_displacement, text
-        if RIM_LOAD * load > SOFTEST_RIM * surface.capacity * surface.rim_stiffness > 0:
-            text = (
-                f"{path}.rim_stiffness = {surface.rim_stiffness:g} N/m stops no slider: compressed by half the "
-                f"capacity, {1e3 * SOFTEST_RIM * surface.capacity:.3g} mm, the rim bears less than a third of the load "
-                f"at rest, {load:.4g} N; is it in N/m, not in kN/mm?"
-            )
-            yield number, surface.rim_stiffness, text
-
-
-def unread_values(bearing: Bearing, effects: Effects | Auto) -> Iterator[tuple[int, float, str]]:
-    """Values of an effect that is off: number of the surface, the value, and the text of the doubt."""
-    for effect, values in contract.SURFACE_OF_EFFECTS.items():
-        if getattr(effects, effect) is not False:
-            continue
-        for number, surface in enumerate(bearing.surfaces, start=1):
-            for name in contract.names(values):
-                value = getattr(surface, name)
-                if value is not None and value != getattr(type(surface), name):
-                    text = (
-                        f"bearing.surfaces[{number - 1}].{name} = {value:g}: effects.{effect} = false, so that nothing "
-                        f"reads it; leave it out, or give {effect} = true"
-                    )
-                    yield number, value, text
 
 
 MIN_LOAD_SHARE = 0.2  # uplift is left out if more than this share of the load at rest remains throughout the run

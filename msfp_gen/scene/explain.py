@@ -18,9 +18,9 @@ from msfp_gen.scene.effect_selection import (
     EffectSelection,
     damping_share,
     quasistatic,
-    scene_doubts,
 )
 from msfp_gen.scene.friction_parameters import law_parameters
+from msfp_gen.scene.plausibility import scene_doubts
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import Limits
 from msfp_gen.scene.system import System
@@ -112,7 +112,7 @@ def surface_table(bearing: Bearing) -> Table:
 
 
 def doubt_tables(doubts: Iterable[tuple[int, float, str]]) -> Iterator[Table]:
-    """A table of doubtful values, as of `effect_selection.doubtful_values`; none without any."""
+    """A table of doubtful values, as of `plausibility.doubtful_values`; none without any."""
     rows = [(text,) for _, _, text in doubts]
     if rows:
         yield Table("values that are hardly meant", ("value",), rows)

@@ -109,6 +109,10 @@ class OtherSystem(ABC):
         """Tables that describe it, as of `scene.explain.explain`."""
         return []
 
+    def refusals(self) -> list[str]:
+        """Why values can hardly be meant, as of `scene.plausibility.refusals`."""
+        return []
+
     def quantities(self) -> dict[str, Any]:
         """What tables report of a run, as of `results.quantities.quantities`."""
         return {}

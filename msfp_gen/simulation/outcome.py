@@ -17,9 +17,10 @@ from msfp_gen.model.model import Model
 from msfp_gen.results.history import Event, Extremes, History
 from msfp_gen.results.note import Note, monitor_notes
 from msfp_gen.results.sliding import intervals, sliding_surfaces
-from msfp_gen.scene.effect_selection import load_at_rest, rigid_mass_limit, scene_doubts
+from msfp_gen.scene.effect_selection import load_at_rest, rigid_mass_limit
 from msfp_gen.scene.effect_switching import JAM_STATUSES
 from msfp_gen.scene.fidelity import UNSEEN
+from msfp_gen.scene.plausibility import scene_doubts
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import MARGIN, seat_stiffness, standing_of

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import os
 import random
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -133,6 +134,7 @@ FILES: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "a unit of something else": (CSV.replace("[g]", "[kN]").encode(), ("'kN' is not a unit of [m/s^2]",)),
     "a row too short": (CSV.replace("0.05, ", "", 1).encode(), ("line", "columns")),
     "time that stands still": (CSV.replace("0.05, ", "0.04, ", 1).encode(), ("evenly spaced",)),
+    "a gap in the times": (re.sub(r"0\.05, .*\n", "", CSV, count=1).encode(), ("line 8", "from 0.04 to 0.06 s")),
     "silence": (b"time [s], a1 [g]\n" + b"".join(b"%d, 0\n" % i for i in range(9)), ("zero",)),
     "two rows": (b"time [s], a1 [g]\n0, 1\n1, 2\n", ("fewer than 4",)),
 }

@@ -133,7 +133,7 @@ from dataclasses import replace
 from msfp_gen import Auto, Effects, load_scene
 from msfp_gen.cli import main
 from msfp_gen.generator.interface import effects_text
-from msfp_gen.scene.effect_selection import scene_doubts
+from msfp_gen.scene.plausibility import scene_doubts
 path = {str(scene)!r}
 text = open(path).read()
 plain = load_scene(path)

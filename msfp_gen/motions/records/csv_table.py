@@ -31,6 +31,7 @@ class Table:
         values: ndarray, shape (k, 3), [m/s^2], [m/s] or [m].
         units: units in the header.
         notes: on missing components, whose values are zero, and on a last number that may be cut.
+        lines: index of the line of every row.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Table:
     values: Array
     units: str
     notes: tuple[str, ...]
+    lines: tuple[int, ...]
 
 
 def matches(lines: Lines) -> bool:
@@ -60,9 +62,15 @@ def read(lines: Lines) -> Record:
     steps = np.diff(table.time)
     step = float((table.time[-1] - table.time[0]) / len(steps)) if len(steps) else 0.0
     even = table.time[0] + step * np.arange(len(table.time))
-    if len(steps) < 3 or not np.all(np.abs(table.time - even) <= _UNEVEN * step):
-        raise InputError(
-            f"{lines.path.name}: times are not evenly spaced, or fewer than 4; resample, or use Motion.from_csv"
+    if len(steps) < 3:
+        raise InputError(f"{lines.path.name}: {len(steps) + 1} times, fewer than 4; give a longer record")
+    if not np.all(np.abs(table.time - even) <= _UNEVEN * step):
+        usual = float(np.median(steps))
+        row = int(np.argmax(np.abs(steps - usual))) + 1
+        lines.fail(
+            table.lines[row],
+            f"times are not evenly spaced: from {table.time[row - 1]:.6g} to {table.time[row]:.6g} s, where "
+            f"other steps are of {usual:.4g} s; fill the gap, resample, or use Motion.from_csv",
         )
     return Record(
         name=table.name,
@@ -103,7 +111,7 @@ def first_line(lines: Lines, header: str = "time [s], a1 [m/s^2], ...") -> tuple
 def _table(lines: Lines) -> Table:
     head, header = first_line(lines)
     names, units, factors = _columns(lines, head, header)
-    rows, last, end = [], [], head
+    rows, last, places = [], [], []
     for index in range(head + 1, len(lines)):
         if lines[index].strip() and not lines[index].lstrip().startswith("#"):
             fields = lines[index].split(",")
@@ -111,14 +119,16 @@ def _table(lines: Lines) -> Table:
                 lines.fail(index, f"{len(fields)} columns, the header names {len(names)}")
             rows.append(lines.numbers(index, fields))
             last.append(fields[-1])
-            end = index
+            places.append(index)
     if not rows:
         lines.fail(head, "no rows of numbers after the header")
-    notes = lines.check_end(end, last)
+    notes = lines.check_end(places[-1], last)
     data = {name: column([row[i] for row in rows]) * factors[i] for i, name in enumerate(names)}
     letter = next(n[0] for n in names if n != "time")
     values, missing = common_window([data.get(f"{letter}{i}") for i in (1, 2, 3)])
-    return Table(stem(lines.path), _QUANTITIES[letter][0], data["time"], values, ", ".join(units), missing + notes)
+    return Table(
+        stem(lines.path), _QUANTITIES[letter][0], data["time"], values, ", ".join(units), missing + notes, tuple(places)
+    )
 
 
 def _columns(lines: Lines, head: int, header: str) -> tuple[list[str], list[str], list[float]]:

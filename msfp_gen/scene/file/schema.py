@@ -150,7 +150,7 @@ SCENE = model_of(
     top_rotation=(_ROTATION, None),
     **{name: (EFFECTS if name == "effects" else model, None) for name, model in PARTS.items()},
 )
-_REMEDIES = {"list_type": "give a list of tables", "literal_error": "give one of the known words"}
+_REMEDIES = {"list_type": "give a list of tables"}
 
 
 def validate_part(name: str, table: Mapping[str, Any]) -> Table:
@@ -241,6 +241,8 @@ def _one_line(model: Model, kind: str, location: tuple[int | str, ...], value: A
         fact = f"{path}.kind = {value['kind']!r}" if "kind" in value else f"{path}.kind is missing"
         kinds = ", ".join(repr(word) for word, _ in _models_in(table.model_fields[key].annotation))
         return f"{fact}: give one of {kinds}"
+    if kind == "literal_error":
+        return f"{path} = {_short(value)}{note}: give {context['expected']}"
     remedy = str(context["error"]) if "error" in context else _REMEDIES.get(kind, "give a table")
     remedy += " or the name of a preset" if path == "bearing" else ""
     return f"{path} = {_short(value)}{note}: {remedy}"

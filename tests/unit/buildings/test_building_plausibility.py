@@ -10,9 +10,11 @@ import pytest
 from support import ROOT
 
 from msfp_gen import InputError, Scene, changed_scene, load_scene, presets
-from msfp_gen.buildings.notes import building_doubts, floors
+from msfp_gen.buildings.notes import building_doubts, floors, value_notes
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.scene.effect_selection import scene_doubts
+from msfp_gen.cli import main
+from msfp_gen.scene.file.loader import scene_text
+from msfp_gen.scene.plausibility import doubtful_values, refusals, scene_doubts
 
 HOSPITAL = "hospital-clc"
 
@@ -33,32 +35,98 @@ def test_floors_are_those_that_were_given() -> None:
     np.testing.assert_allclose([floor.centre for floor in made], [(0, 0), *3 * [(1.1, 0.75)]], atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"building.base.mass": 450.0}, "building.base.mass = 450 kg is 0.0017 of the mean of all floors; is it in kg"),
-        (
-            {"building.storey[1].inertia": [7.1e6, 16e6, 380e3 * 200.0**2]},
-            "building.storey[1].inertia: about E3 the radius of gyration is 200 m, the bearings are at most 27",
-        ),
-        (
-            {"building.storey[0].stiffness": [3.6e5, 3.0e5]},
-            "building.storey[0].stiffness: under 0.1 g the storey drifts",
-        ),
-        (
-            {"building.storey[2].height": 40.0},
-            "building.storey[2].height = 40 m is unusually high; is it in m, not in mm",
-        ),
-        (
-            {"building.interface.vertical_stiffness": 1.7e6},
-            "interface.vertical_stiffness = 1.7e+06 N/m: the building settles by 0.911 m at rest; is it in N/m",
-        ),
-    ],
-    ids=["mass", "gyration", "stiffness", "height", "sag"],
-)
-def test_unlikely_values_are_named_with_the_likely_unit(changes: dict[str, Any], words: str) -> None:
-    texts = [text for *_, text in building_doubts(building(changes))]
-    assert sum(words in text for text in texts) == 1, texts
+def doubts_of(scene: Any) -> list[str]:
+    """The texts of all doubts, each once."""
+    if isinstance(scene, Scene):
+        return [text for *_, text in scene_doubts(scene)]
+    of_bearings = [
+        note.text
+        for mount, load in zip(scene.bearings, scene.axial_loads, strict=True)
+        for note in value_notes(mount, load)
+    ]
+    return list(dict.fromkeys([*(text for *_, text in building_doubts(scene)), *of_bearings]))
+
+
+TEST, RECORD = "fenz-test2", "ridgecrest-clc"
+MISTAKES: list[tuple[str, dict[str, Any], str, bool]] = [
+    # scene, changes, words of the note, whether it is refused
+    (TEST, {"top.axial_load": 112.0}, "the load at rest of 202.6 N is 0.0992 MPa on the smallest face", True),
+    (TEST, {"top.axial_load": 112e6, "top.rotational_stiffness": 1e9}, "is 5.48e+04 MPa on the smallest face", True),
+    (TEST, {"top.axial_load": 1120.0}, "is 0.593 MPa on the smallest face", False),
+    (TEST, {"limits": {"displacement": 760}}, "limits.displacement = 760 m is 4.39e+03 times the capacity", True),
+    (TEST, {"limits": {"displacement": 0.5}}, "limits.displacement = 0.5 m is 2.89 times the capacity", False),
+    (TEST, {"limits": {"axial_load": 300}}, "limits.axial_load = 300 N is 0.00268 times the load", True),
+    (TEST, {"bearing.gravity": 386.0}, "bearing.gravity = 386 m/s^2 is far from 9.81", False),
+    (TEST, {"bearing.gravity": 9810.0}, "bearing.gravity = 9810 m/s^2 is far from 9.81", True),
+    (TEST, {"top.stiffness": 2e5}, "top.stiffness = 200000 N/m is 0.84 times the stiffness of the bearing", False),
+    (TEST, {"top.stiffness": 1e5}, "top.stiffness = 100000 N/m is 0.42 times the stiffness of the bearing", True),
+    (TEST, {"bearing.base_height": 0.4}, "bearing.base_height = 0.4 m is 0.85 of the radius", False),
+    (TEST, {"bearing.bodies[3].height": 0.4}, "bearing.bodies[3].height = 0.4 m is 0.85 of the radius", False),
+    (
+        TEST,
+        {"bearing.bodies[1].rim_radius": 0.05},
+        "bodies[1].rim_radius = 0.05 m: at the capacity of surface 2",
+        False,
+    ),
+    (TEST, {"bearing.surfaces[1].radius": 0.6}, "surfaces[1].radius = 0.6 m is larger than that of the surface", False),
+    (TEST, {"bearing.surfaces[2].radius": 0.6}, "surfaces[2].radius = 0.6 m is larger than that of the surface", False),
+    (TEST, {"bearing.surfaces[0].friction": 6.0}, "surfaces[0].friction = 6 is unusually high", False),
+    (RECORD, {"motion.scale": 8.0}, "motion: the peak acceleration of 40", False),
+    (RECORD, {"motion.scale": 8.0}, "motion.scale = 8 changes the record by more than is usual", False),
+    (RECORD, {"motion.scale": 0.02}, "is 0.0103 g; are the unit of the record and motion.scale right?", False),
+    (RECORD, {"motion.scale": 0.001}, "is 0.000517 g; are the unit of the record", True),
+    (
+        RECORD,
+        {"motion.scale_to": {"sds": 0.5, "sd1": 0.3, "between": [0.5, 3.0]}},
+        "'1.5 g' is a text with its unit",
+        False,
+    ),
+    (
+        HOSPITAL,
+        {"building.base.mass": 450.0},
+        "building.base.mass = 450 kg is 0.0017 of the mean of all floors",
+        False,
+    ),
+    (
+        HOSPITAL,
+        {"building.storey[1].inertia": [7.1e6, 16e6, 380e3 * 200.0**2]},
+        "building.storey[1].inertia: about E3 the radius of gyration is 200 m, the bearings are at most 27",
+        False,
+    ),
+    (HOSPITAL, {"building.storey[0].stiffness": [3.6e5, 3.0e5]}, "under 0.1 g the storey drifts", False),
+    (
+        HOSPITAL,
+        {"building.storey[2].height": 40.0},
+        "storey[2].height = 40 m is unusually high; is it in m",
+        False,
+    ),
+    (
+        HOSPITAL,
+        {"building.interface.vertical_stiffness": 1.7e6},
+        "interface.vertical_stiffness = 1.7e+06 N/m: the building settles by 0.911 m at rest; is it in N/m",
+        False,
+    ),
+    (
+        HOSPITAL,
+        {"building.damping_ratio": 0.5},
+        "building.damping_ratio: the first mode on a fixed base has 0.5",
+        False,
+    ),
+    (
+        HOSPITAL,
+        {"building.storey[0].torsional_stiffness": 1e5},
+        "the lowest frequency on a fixed base is 0",
+        False,
+    ),
+    (HOSPITAL, {"limits": {"displacement": 760}}, "limits.displacement = 760 m is 1.1e+03 times the capacity", True),
+]
+
+
+@pytest.mark.parametrize(("name", "changes", "words", "refused"), MISTAKES, ids=lambda value: str(value)[:60])
+def test_values_that_are_hardly_meant_are_named(name: str, changes: dict[str, Any], words: str, refused: bool) -> None:
+    scene = changed_scene(name, changes)
+    assert sum(words in text for text in doubts_of(scene)) == 1, doubts_of(scene)
+    assert any(words in text for text in refusals(scene)) == refused
 
 
 @pytest.mark.parametrize(
@@ -92,8 +160,29 @@ def test_no_published_design_is_blamed() -> None:
         *(str(path) for path in sorted((ROOT / "examples").glob("*.toml"))),
     ]:
         scene = load_scene(name)
-        doubts = list(scene_doubts(scene) if isinstance(scene, Scene) else building_doubts(scene))
-        assert not doubts, name
+        assert not doubts_of(scene) and not refusals(scene), name
+    for name in presets.names("bearing"):
+        assert not list(doubtful_values(presets.bearing(name))), name
+
+
+def test_the_times_of_a_record_are_in_seconds(tmp_path: Any) -> None:
+    path = tmp_path / "micro.csv"
+    rows = [f"{5e-6 * i:.7g},{np.sin(2e-3 * np.pi * i):.6g}" for i in range(3001)]
+    path.write_text("\n".join(["time [s],a1 [m/s^2]", *rows]))
+    found = changed_scene("ridgecrest-clc", {"motion": {"kind": "record", "file": str(path), "correct": False}})
+    assert any("the samples are 5e-06 s apart" in text for text in refusals(found))
+
+
+def test_what_is_refused_runs_if_it_is_told_to(tmp_path: Any, capsys: Any) -> None:
+    path, out = tmp_path / "scene.toml", tmp_path / "out.nc"
+    path.write_text(scene_text(changed_scene("fenz-test2", {"limits": {"displacement": 760.0}, "duration": 1.0})))
+    assert main(["run", str(path), "-o", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "limits.displacement = 760 m" in error and "--force" in error and not out.exists()
+    for command in (["batch", str(path)], ["bound", str(path)], ["characterise", str(path)]):
+        assert main(command) == 2 and "limits.displacement = 760 m" in capsys.readouterr().err
+    assert main(["run", str(path), "--force", "-o", str(out)]) == 0 and out.is_file()
+    assert "limits.displacement = 760 m" in capsys.readouterr().err
 
 
 def test_a_single_bearing_has_no_plan() -> None:

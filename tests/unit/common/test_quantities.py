@@ -20,6 +20,8 @@ from msfp_gen.common.fields import Quantity, to_si
         ("100 gal", "m/s^2", 1.0),
         ("100 cm/s²", "m/s^2", 1.0),
         ("980 cm/s^2", "m/s^2", 9.8),
+        ("980 cm/s2", "m/s^2", 9.8),
+        ("3.01 kg cm2", "kg m^2", 3.01e-4),
         ("5 N s/m", "N s/m", 5.0),
         ("5 kN*s/m", "N s/m", 5e3),
         ("1e3 kN·m/rad", "N m/rad", 1e6),

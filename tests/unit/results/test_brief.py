@@ -34,6 +34,15 @@ def test_many_notes_and_a_failure_stay_within_ten_lines() -> None:
     assert len(text.splitlines()) <= 10 and "6 more in .notes" in text and "newton: stopped at t = 3 s" in text
 
 
+def test_a_decisive_note_is_never_among_those_that_are_counted() -> None:
+    minor = [Note(float(k), "ringing", 1, 2.0, "rings") for k in range(3)]
+    values = [Note(0.0, "value", k, 1.0, f"value {k} is hardly meant") for k in range(4)]
+    uplift = Note(9.0, "uplift", 1, 0.0, "the bearing may lift off")
+    added = Note(1.0, "uplift", 1, 0.0, "opened", action="uplift = True")
+    lines, others = replace(preset_run("fenz-test2"), notes=(*minor, *values, added, uplift)).first_notes
+    assert lines == [*(note.line for note in values), uplift.line] and others == 4
+
+
 def test_a_notebook_shows_a_table_and_a_loop() -> None:
     result = replace(preset_run("fenz-test2"), message="<b>&")
     html = result._repr_html_()

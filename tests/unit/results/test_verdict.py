@@ -38,8 +38,8 @@ from msfp_gen.results.note import Note
 from msfp_gen.results.result import load_result
 from msfp_gen.results.sliding import intervals, merged, openings
 from msfp_gen.results.verdict import LIMITS, RIM_SHARE, Reading, Value
-from msfp_gen.scene.effect_selection import scene_doubts
 from msfp_gen.scene.explain import explain
+from msfp_gen.scene.plausibility import scene_doubts
 
 OPENING = 3e-3  # [m]
 GIVEN = [limit.key for limit in LIMITS if limit.key in {field.name for field in fields(Limits)}]

@@ -8,8 +8,8 @@ import pytest
 from support import scene_of
 
 from msfp_gen import Bearing, InputError, load_scene, presets, simulate
-from msfp_gen.scene.effect_selection import doubtful_values
 from msfp_gen.scene.explain import explain
+from msfp_gen.scene.plausibility import doubtful_values
 
 TFP = presets.bearing("fenz-tfp")
 PUBLISHED = [0.03, 0.017, 0.017, 0.107]

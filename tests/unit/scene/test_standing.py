@@ -23,8 +23,8 @@ from msfp_gen import (
     simulate,
 )
 from msfp_gen.buildings.notes import building_doubts, value_notes
-from msfp_gen.scene.effect_selection import scene_doubts
 from msfp_gen.scene.explain import explain
+from msfp_gen.scene.plausibility import scene_doubts
 from msfp_gen.scene.standing import links, needed_rotational_stiffness, standing_of
 
 PLANAR = Effects(dimension="planar")

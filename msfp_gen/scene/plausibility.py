@@ -1,0 +1,360 @@
+"""Values that are hardly meant: a table of checks, each with its usual range, and the notes on a scene that follow.
+
+A value beyond its usual range gives a note with field, value and remedy; one beyond the wider range, as of a unit that
+is off by a thousand, is refused by the command line unless it is told to run (`refusals`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from math import inf, pi
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from msfp_gen.motions.motion import Motion
+from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.effect_selection import load_at_rest
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.scene_fields import Limits, SceneFields
+from msfp_gen.scene.standing import standing_of, unsteady
+from msfp_gen.scene.top import MassTop, RigTop, Top, sprung_mass
+from msfp_gen.specification import contract
+from msfp_gen.specification.layout import Auto, Effects
+
+Doubt = tuple[int, float, str]  # number of the surface, 0: none; the value; the text
+Range = tuple[float, float]
+G = 9.80665  # standard gravity [m/s^2]
+LEAST_DAMPING = 0.01  # ratio of a vibration on vertical springs below which what it adds depends on the tolerance
+USUAL_DAMPING = 0.02  # ratio that is named as the remedy
+RIM_LOAD = 1 / 3  # of the load at rest, which a rim must bear
+SOFTEST_RIM = 0.5  # compression of a rim by this load, over the capacity
+
+
+class Subject(NamedTuple):
+    """What is judged: a bearing with its load at rest [N], 0: not known or there are no rims, and what acts on it."""
+
+    bearing: Bearing
+    load: float = 0.0
+    rims: bool = True
+    motion: Motion | None = None
+    limits: Limits | None = None
+    top: Top | None = None
+
+
+class Reading(NamedTuple):
+    """A value to judge. number: of its surface or body, from 1; 0: none. measure: what the range is of."""
+
+    number: int
+    value: float
+    measure: float
+    words: dict[str, Any] = {}  # noqa: RUF012  # further names in the text; never changed
+
+
+class Check(NamedTuple):
+    """A value, its usual range, and the text of the note outside of it.
+
+    read: of a `Subject`, or of a building. text: with {index} of surface or body from 0, {value}, {measure} and the
+    words of the reading. refused: range beyond which no unit can be right.
+    """
+
+    read: Callable[[Any], Iterator[Reading]]
+    usual: Range
+    text: str
+    refused: Range = (-inf, inf)
+
+
+def _of_surfaces(name: str, over: str = "") -> Callable[[Subject], Iterator[Reading]]:
+    """Reads a field of every surface, and judges it over another field."""
+
+    def read(subject: Subject) -> Iterator[Reading]:
+        for number, surface in enumerate(subject.bearing.surfaces, start=1):
+            value = getattr(surface, name)
+            yield Reading(number, value, value / getattr(surface, over) if over else value)
+
+    return read
+
+
+def _rim_stiffness(subject: Subject) -> Iterator[Reading]:
+    for number, surface in enumerate(subject.bearing.surfaces, start=1):
+        borne = SOFTEST_RIM * surface.capacity * surface.rim_stiffness
+        if subject.rims and borne > 0:
+            words = {"compressed": 1e3 * SOFTEST_RIM * surface.capacity, "load": subject.load}
+            yield Reading(number, surface.rim_stiffness, RIM_LOAD * subject.load / borne, words)
+
+
+def _pressure(subject: Subject) -> Iterator[Reading]:
+    """The load at rest, judged by the pressure on the smallest face of a slider [MPa]."""
+    radii = [subject.bearing.slider_rim_radius(index) for index in range(len(subject.bearing.surfaces))]
+    if subject.load > 0 and min(radii) > 0:
+        words = {"diameter": 2e3 * min(radii)}
+        yield Reading(0, subject.load, subject.load / (pi * min(radii) ** 2) * 1e-6, words)
+
+
+def _plates(subject: Subject) -> Iterator[Reading]:
+    """Heights of base and top plate over the radius of their surface."""
+    bearing = subject.bearing
+    for name, height, surface in (("base_height", bearing.base_height, 0), ("", bearing.bodies[-1].height, -1)):
+        path = name or f"bodies[{len(bearing.bodies) - 1}].height"
+        yield Reading(0, height, height / bearing.surfaces[surface].radius, {"path": path})
+
+
+def _sides(bearing: Bearing) -> Iterator[list[int]]:
+    """Indices of the surfaces below and above the innermost body, each from the outside."""
+    lower = bearing.layout.signs.count(1)
+    count = len(bearing.surfaces)
+    yield list(range(lower))
+    yield list(range(count - 1, lower - 1, -1))
+
+
+def _nested(subject: Subject) -> Iterator[Reading]:
+    """Reach of each inner slider, its radius and capacity, over the radius of the slider in which it slides."""
+    bearing = subject.bearing
+    for side in _sides(bearing):
+        for outer, inner in pairwise(side):
+            plate, own = bearing.slider_rim_radius(outer), bearing.slider_rim_radius(inner)
+            if plate > 0 and own > 0:
+                reach = own + bearing.surfaces[inner].capacity
+                body = bearing.slider(inner)
+                yield Reading(body, own, reach / plate, {"reach": 1e3 * reach, "plate": 1e3 * plate, "s": inner + 1})
+
+
+def _order(subject: Subject) -> Iterator[Reading]:
+    """Radius of each inner surface over the radius of the one outside."""
+    surfaces = subject.bearing.surfaces
+    for side in _sides(subject.bearing):
+        for outer, inner in pairwise(side):
+            value, outside = surfaces[inner].radius, surfaces[outer].radius
+            yield Reading(inner + 1, value, value / outside, {"outer": outer, "outside": outside})
+
+
+def _gravity(subject: Subject) -> Iterator[Reading]:
+    yield Reading(0, subject.bearing.gravity, subject.bearing.gravity)
+
+
+def _limits(name: str) -> Callable[[Subject], Iterator[Reading]]:
+    """Reads a limit of the device, and judges it over the capacity of all surfaces together or the load at rest."""
+
+    def read(subject: Subject) -> Iterator[Reading]:
+        value = getattr(subject.limits, name, None)
+        of = subject.load if name == "axial_load" else sum(s.capacity for s in subject.bearing.surfaces)
+        if value is not None and of > 0:
+            yield Reading(0, value, value / of, {"of": of})
+
+    return read
+
+
+def _record(motion: Motion | None) -> bool:
+    """Whether a motion comes from the file of a record."""
+    return motion is not None and "format" in motion.metadata
+
+
+def _peak(subject: Subject) -> Iterator[Reading]:
+    """Largest horizontal acceleration of a record, in g."""
+    if subject.motion is not None and _record(subject.motion):
+        peak = float(np.linalg.norm(subject.motion.acceleration(subject.motion.knots)[:, :2], axis=1).max())
+        if peak > 0:
+            yield Reading(0, peak, peak / G)
+
+
+def _sampling(subject: Subject) -> Iterator[Reading]:
+    """Median time between the samples of a record [s]."""
+    if subject.motion is not None and _record(subject.motion):
+        step = float(np.median(np.diff(subject.motion.knots)))
+        yield Reading(0, step, step)
+
+
+def _scale(subject: Subject) -> Iterator[Reading]:
+    if subject.motion is not None and _record(subject.motion):
+        scale = float(subject.motion.metadata.get("scale", 1.0))
+        yield Reading(0, scale, abs(scale))
+
+
+def _rig(subject: Subject) -> Iterator[Reading]:
+    """Stiffness of the spring of a rig over that of the largest sphere under the load."""
+    if isinstance(subject.top, RigTop) and subject.top.stiffness > 0 and subject.load > 0:
+        own = subject.load / max(surface.radius for surface in subject.bearing.surfaces)
+        yield Reading(0, subject.top.stiffness, subject.top.stiffness / own, {"own": own})
+
+
+_S = "bearing.surfaces[{index}]"
+OF_BEARING = (
+    Check(
+        _of_surfaces("friction"),
+        (-inf, 0.3),
+        _S + ".friction = {value:g} is unusually high; a fraction is meant, not per cent",
+    ),
+    Check(
+        _of_surfaces("radius"),
+        (0.05, 20.0),
+        _S + ".radius = {value:g} m is outside 0.05 to 20 m; is it in metres?",
+        (0.005, 200.0),
+    ),
+    Check(
+        _of_surfaces("capacity", "radius"),
+        (-inf, 0.5),
+        _S + ".capacity = {value:g} m tilts the slider by {measure:.2g} rad; is it the displacement along the surface, "
+        "in metres?",
+    ),
+    Check(
+        _of_surfaces("yield_displacement", "capacity"),
+        (-inf, 0.1),
+        _S + ".yield_displacement = {value:g} m is more than a tenth of the capacity; usual are 0.1 to 1 mm",
+    ),
+    Check(
+        _rim_stiffness,
+        (-inf, 1.0),
+        _S
+        + ".rim_stiffness = {value:g} N/m stops no slider: compressed by half the capacity, {compressed:.3g} mm, the "
+        "rim bears less than a third of the load at rest, {load:.4g} N; is it in N/m, not in kN/mm?",
+    ),
+    Check(
+        _pressure,
+        (1.0, 400.0),
+        "the load at rest of {value:.4g} N is {measure:.3g} MPa on the smallest face of a slider, {diameter:.4g} mm "
+        "wide; are axial_load or mass in N and kg, and the rim_radius of bodies in m?",
+        (0.15, 5000.0),
+    ),
+    Check(
+        _plates,
+        (-inf, 0.7),
+        "bearing.{path} = {value:g} m is {measure:.2g} of the radius of its surface; is it the height of the plate at "
+        "its axis, in metres?",
+    ),
+    Check(
+        _nested,
+        (-inf, 1.25),
+        "bearing.bodies[{index}].rim_radius = {value:g} m: at the capacity of surface {s} this slider reaches "
+        "{reach:.4g} mm from the axis of the one in which it slides, whose radius is {plate:.4g} mm; are the radii of "
+        "the sliders in their order?",
+    ),
+    Check(
+        _order,
+        (-inf, 1.0),
+        _S + ".radius = {value:g} m is larger than that of the surface outside, surfaces[{outer}].radius = {outside:g} "
+        "m; surfaces go from the bottom: are outer and inner ones, or m and p of the layout, exchanged?",
+    ),
+    Check(
+        _gravity,
+        (9.7, 9.9),
+        "bearing.gravity = {value:g} m/s^2 is far from 9.81; is it in m/s^2?",
+        (0.5, 1000.0),
+    ),
+)
+"""Checks of a bearing and of its load at rest."""
+OF_RUN = (
+    Check(
+        _limits("displacement"),
+        (0.05, 1.5),
+        "limits.displacement = {value:g} m is {measure:.3g} times the capacity of all surfaces, {of:.3g} m; is it in "
+        "metres?",
+        (0.001, 50.0),
+    ),
+    Check(
+        _limits("axial_load"),
+        (0.9, 30.0),
+        "limits.axial_load = {value:g} N is {measure:.3g} times the load at rest, {of:.4g} N; is it in N, not in kN?",
+        (0.01, 1000.0),
+    ),
+    Check(
+        _peak,
+        (0.02, 3.0),
+        "motion: the peak acceleration of {value:.3g} m/s^2 is {measure:.3g} g; are the unit of the record and "
+        "motion.scale right?",
+        (1e-3, 100.0),
+    ),
+    Check(
+        _sampling,
+        (2e-4, 0.1),
+        "motion: the samples are {value:.3g} s apart; are the times of the record in s?",
+        (3e-5, 2.0),
+    ),
+    Check(
+        _scale,
+        (0.2, 3.0),
+        "motion.scale = {value:.4g} changes the record by more than is usual (0.2 to 3); is the target of the scaling "
+        "in m/s^2? '1.5 g' is a text with its unit",
+        (-inf, 300.0),
+    ),
+    Check(
+        _rig,
+        (10.0, inf),
+        "top.stiffness = {value:g} N/m is {measure:.2g} times the stiffness of the bearing, {own:.3g} N/m, so that the "
+        "rig moves instead; is it in N/m, not in kN/m?",
+        (0.5, inf),
+    ),
+)
+"""Checks of what acts on a bearing, and of its limits."""
+
+
+def judged(checks: Sequence[Check], subject: Any) -> Iterator[tuple[Doubt, bool]]:
+    """The doubts about what is outside its usual range, and whether it is refused."""
+    for check in checks:
+        for reading in check.read(subject):
+            number, value, measure, words = reading
+            if not check.usual[0] <= measure <= check.usual[1]:
+                text = check.text.format(index=number - 1, value=value, measure=measure, **words)
+                yield (number, value, text), not check.refused[0] <= measure <= check.refused[1]
+
+
+def doubtful_values(bearing: Bearing, load: float = 0.0) -> Iterator[Doubt]:
+    """Values of a bearing that are unlikely. load: at rest [N]; 0: not known."""
+    yield from (doubt for doubt, _ in judged(OF_BEARING, Subject(bearing, load)))
+
+
+def subject_of(scene: SceneFields) -> Subject:
+    """What is judged in a scene of one bearing."""
+    rims = scene.effects.rims is not False
+    return Subject(scene.bearing, load_at_rest(scene), rims, scene.motion, scene.limits, scene.top)
+
+
+def scene_doubts(scene: SceneFields) -> Iterator[Doubt]:
+    """Doubts about values of a scene, and about the springs that hold its top plate up."""
+    yield from (doubt for doubt, _ in judged((*OF_BEARING, *OF_RUN), subject_of(scene)))
+    yield from unread_values(scene.bearing, scene.effects)
+    if standing := standing_of(scene):
+        yield from unsteady(*standing[:3])
+    if (mass := sprung_mass(scene.top)) and isinstance(scene.top, MassTop):
+        turn = np.sqrt((scene.top.vertical_stiffness or 0.0) / mass)
+        damping = scene.top.vertical_damping
+        ratio, cure = damping / (2 * turn * mass), 2 * USUAL_DAMPING * turn * mass
+        if ratio < LEAST_DAMPING:
+            name, what = "top.vertical_damping", "the mass vibrates on its vertical spring"
+            yield 0, ratio, ringing(name, damping, what, turn, ratio, cure)
+
+
+def refusals(system: Any) -> list[str]:
+    """The texts of the doubts about values that no unit can make right, each once."""
+    if not isinstance(system, Scene):
+        return list(dict.fromkeys(system.refusals()))
+    return [text for (_, _, text), refused in judged((*OF_BEARING, *OF_RUN), subject_of(system)) if refused]
+
+
+def ringing(path: str, damping: float, what: str, turn: float, ratio: float, cure: float) -> str:
+    """The text of a doubt about a vibration that rings on.
+
+    path: of the damping in messages. damping: its value [N s/m]. what: the part that vibrates. turn: its circular
+    frequency [rad/s]. ratio: its damping ratio [-]. cure: damping with which it has `USUAL_DAMPING` [N s/m].
+    """
+    return (
+        f"{path} = {damping:g}: {what} at {turn / (2 * np.pi):.3g} Hz with {ratio:.1%} of critical damping and rings "
+        f"on: accelerations and rotations depend on the tolerance by several per cent; give {cure:.3g} N s/m for "
+        f"{USUAL_DAMPING:.0%}"
+    )
+
+
+def unread_values(bearing: Bearing, effects: Effects | Auto) -> Iterator[tuple[int, float, str]]:
+    """Values of an effect that is off: number of the surface, the value, and the text of the doubt."""
+    for effect, values in contract.SURFACE_OF_EFFECTS.items():
+        if getattr(effects, effect) is not False:
+            continue
+        for number, surface in enumerate(bearing.surfaces, start=1):
+            for name in contract.names(values):
+                value = getattr(surface, name)
+                if value is not None and value != getattr(type(surface), name):
+                    text = (
+                        f"bearing.surfaces[{number - 1}].{name} = {value:g}: effects.{effect} = false, so that nothing "
+                        f"reads it; leave it out, or give {effect} = true"
+                    )
+                    yield number, value, text
