@@ -6,6 +6,7 @@ import os
 
 import pytest
 
+from msfp_gen.cli import console
 from msfp_gen.jit.cache import MANIFEST_NAME, cache_root
 
 # Before NumPy is imported, here and in what the tests start: threads of BLAS in each of several processes wait for each
@@ -32,6 +33,7 @@ def models() -> set[str]:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.stash[_BEFORE] = models()
+    console.EVERY = 1e6  # a slow machine prints no line of progress more than a fast one
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
