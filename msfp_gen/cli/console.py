@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 
-from msfp_gen.common.errors import RunError, printable
+from msfp_gen.common.errors import InputError, RunError, printable
 from msfp_gen.common.fields import Choice, Rule, ruled_fields
 from msfp_gen.results.sign import SIGNS
 from msfp_gen.specification.layout import Effects
