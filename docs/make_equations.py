@@ -15,7 +15,7 @@ from msfp_gen.common.tables import markdown_table
 from msfp_gen.generator import body, contact, energy, laws, parameters, top, two_port
 from msfp_gen.generator.derive import derive
 from msfp_gen.generator.latex import statements, to_latex
-from msfp_gen.generator.schedule import Decision, Over, Pass, condensed, momentum_balances, passes_of
+from msfp_gen.generator.schedule import If, Over, Pass, condensed, momentum_balances, passes_of
 from msfp_gen.generator.schedule import two_port as ends
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
@@ -221,7 +221,11 @@ def module_of(program: str) -> str:
 
 def program_sections() -> list[str]:
     """The statements of every program."""
-    shown = (Effects(dimension="planar", sliders="massless", bouc_wen="report"), Effects(bouc_wen="report"))
+    shown = (
+        Effects(dimension="planar", sliders="massless", bouc_wen="report"),
+        Effects(top_rotation=True),
+        Effects(bouc_wen="report"),
+    )
     programs = {p.name: p for effects in shown for p in derive(ModelSpec(Layout.tfp(), effects)).programs}
     parts = []
     for name, title in TITLES.items():
@@ -244,7 +248,7 @@ def schedule_table(passes: Iterable[Pass]) -> str:
         for call in one.calls:
             reads, writes = (", ".join(map(place, places)) for places in (call.reads, call.writes))
             program = " or ".join(f"`{name}`" for name in call.programs)
-            program += ", where it acts" if isinstance(call.by, Decision) else ""
+            program += ", where it acts" if isinstance(call.by, If) else ""
             rows.append((OVER[one.over], program, reads, writes))
     return markdown_table(("over", "program", "reads", "writes"), rows)
 

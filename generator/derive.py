@@ -83,7 +83,7 @@ def derive(spec: ModelSpec) -> Equations:
         top.top_energy(blocks),
         contact.gap(blocks),
         *energy.programs(blocks, effects.rims, effects.uplift, effects.top_rotation),
-        *two_port.programs(blocks),
+        *(two_port.programs(blocks) if effects.permits_moving_ends else ()),
     ]
     if effects.top_rotation:
         programs.append(top.upright(blocks))

@@ -103,7 +103,8 @@ def schedule_context(equations: Equations, directional: Iterable[Kernel], by_end
     """Variables of the templates of the schedules. directional, by_ends: the kernels of a model that has these."""
     effects, programs = equations.spec.effects, {program.name: program for program in equations.programs}
     balances, with_directions = momentum_balances(effects), {**condensed(effects), **energies(effects)}
-    port, of_ends = two_port(effects), {**condensed(effects), **two_port(effects)}
+    port = two_port(effects) if effects.permits_moving_ends else {}
+    of_ends = {**condensed(effects), **port}
     moving = check(passes_of(balances), programs, equations.blocks)
     moving |= check(passes_of(with_directions), programs, equations.blocks)
     directed = _lists(with_directions)

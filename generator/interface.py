@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from msfp_gen.specification.layout import ModelSpec
     from msfp_gen.specification.values import Bound
 
-ABI_VERSION = 3
+ABI_VERSION = 4
 CALL_ERRORS = (  # what calls return beside the statuses of a run: name, meaning and remedy
     ("argument", "an argument is missing or out of range; `message` names it"),
     ("snapshot", "these bytes are no snapshot of this model with these inputs by this build"),
@@ -104,10 +104,15 @@ def interface_context(spec: ModelSpec, shape: Any, header: str) -> dict[str, Any
 
 
 def _api_functions(spec: ModelSpec, symbols: set[str], header: str) -> Iterator[tuple[str, str]]:
-    """The functions of the table of a model and those of the runtime behind them; of gradients where it has them."""
+    """The functions of the table of a model and those of the runtime behind them; of gradients and two-ports where it
+    has them. What makes a two-port and ends it is always there, to refuse; so are the weights of methods.
+    """
+    without = {"gradient": not spec.gradients, "port_": not spec.effects.permits_moving_ends}
+    absent = tuple(prefix for prefix, true in without.items() if true)
+    always = ("port_new", "port_new_loaded", "port_free", "port_method")
     for name in functions(header):
         own = [symbol for symbol in (f"msfp_api_{name}", f"msfp_{name}") if symbol in symbols]
-        if own and (spec.gradients or not name.startswith("gradient")):
+        if own and (name in always or not name.startswith(absent)):
             yield name, own[0]
         elif name.startswith("status"):
             yield name, name  # of table.c

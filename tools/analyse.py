@@ -78,7 +78,7 @@ def emit() -> dict[Path, list[str]]:
     sources = {name: {**files, **build.headers()} for name, files in sources.items()}
     if not QUICK:
         for name, spec in MODELS.items():
-            sources[name] = {**runtime_sources(spec.gradients), **generate(spec).files}
+            sources[name] = {**runtime_sources(spec), **generate(spec).files}
         sources |= {f"fmi{version}": unit_sources(version) for version in (2, 3)}
     units = {}
     for name, files in sources.items():

@@ -37,7 +37,7 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import MassTop
 from msfp_gen.specification import contract
-from msfp_gen.specification.layout import Auto
+from msfp_gen.specification.layout import Auto, ModelSpec
 
 VERSIONS = (2, 3)
 KINDS = {"me": "ModelExchange", "cs": "CoSimulation"}  # in the order of the schema
@@ -92,7 +92,7 @@ def write_fmu(
         raise
     shutil.rmtree(folder)
     write_bytes(target, [_archive(content)])
-    return WrittenUnit(target, model_name(rest.spec), unit.kinds, tuple(unit.variables))
+    return WrittenUnit(target, model_name(spec_of_unit(rest)), unit.kinds, tuple(unit.variables))
 
 
 def scene_of_unit(scene: Scene) -> Scene:
@@ -112,6 +112,11 @@ def scene_of_unit(scene: Scene) -> Scene:
     if scene.solver.method == "dopri5":
         raise InputError("solver.method = 'dopri5': the steps of a unit are implicit; give 'implicit' or 'esdirk4'")
     return Scene(scene.bearing, Motion(*REST), scene.top, effects=effects, solver=scene.solver, name=scene.name)
+
+
+def spec_of_unit(scene: Scene) -> ModelSpec:
+    """The model of a unit, a two-port: where the scene has no support of the top that rotates, it is at rest."""
+    return ModelSpec(scene.bearing.layout, replace(scene.modelled, top_rotation=True))
 
 
 def _check_exchange(scene: Scene) -> None:
@@ -134,7 +139,7 @@ def _check_exchange(scene: Scene) -> None:
 
 def _unit(scene: Scene, name: str, version: int, exchange: bool) -> Unit:
     unit_variables = variables(scene, exchange)
-    what = f"{scene.spec.key} {scene.solver!r} {version} {exchange} {__version__} {unit_variables!r}"
+    what = f"{spec_of_unit(scene).key} {scene.solver!r} {version} {exchange} {__version__} {unit_variables!r}"
     digest = hashlib.sha256(what.encode())
     for text in _written(version).values():
         digest.update(text.encode())
@@ -143,7 +148,7 @@ def _unit(scene: Scene, name: str, version: int, exchange: bool) -> Unit:
         name=name,
         identifier=re.sub(r"^(?=\d)|\W", "_", name, flags=re.ASCII),
         token=f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}",
-        text=f"Multi-stage friction pendulum bearing (PEER 2017/07), {inout}; {effects_text(scene.spec)}",
+        text=f"Multi-stage friction pendulum bearing (PEER 2017/07), {inout}; {effects_text(spec_of_unit(scene))}",
         kinds=tuple(kind for short, kind in KINDS.items() if short == "cs" or exchange),
         tolerance=scene.solver.rtol,
         variables=unit_variables,
@@ -171,14 +176,14 @@ def _files(
         others[name] = render(f"fmi/{name}", content)
     system, suffix = _SYSTEMS.get(sys.platform, ("linux", ".so"))
     library = f"{unit.identifier}{suffix}"
-    sources = build_shared(scene.spec, others, f"fmi{version}*", library, folder, progress)
+    sources = build_shared(spec_of_unit(scene), others, f"fmi{version}*", library, folder, progress)
     unit = replace(unit, sources=tuple(name for name in sources if name.endswith(".c")))
     archive_files = {"modelDescription.xml": model_description(unit, version)}
     archive_files[f"binaries/{_platform(system, version)}/{library}"] = (folder / library).read_bytes()
     archive_files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     if version == 3:
         archive_files["sources/buildDescription.xml"] = build_description(unit)
-    page = {"unit": unit, "scene": scene, "stamp": content["stamp"], "effects": effects_text(scene.spec)}
+    page = {"unit": unit, "scene": scene, "stamp": content["stamp"], "effects": effects_text(spec_of_unit(scene))}
     archive_files["documentation/index.html"] = render("fmi/index.html", page).encode()
     return archive_files
 
@@ -201,12 +206,12 @@ def _archive(content: dict[str, bytes]) -> bytes:
 
 def model_content(scene: Scene, unit: Unit, exchange: bool) -> dict[str, Any]:
     """The names in the templates fmu_model.h and fmu_model.c."""
-    effects, count = scene.spec.effects, scene.bearing.layout.surfaces
+    effects, count = scene.modelled, scene.bearing.layout.surfaces
     loaded, surface = isinstance(scene.top, MassTop), contract.surface_values(effects)
     top, body = contract.names(contract.TOP), contract.names(contract.BODY)
     return {
         "stamp": f"written by msfp-gen {__version__}",
-        "model": model_name(scene.spec),
+        "model": model_name(spec_of_unit(scene)),
         "token": unit.token,
         "mass": int(loaded),
         "exchange": int(exchange),

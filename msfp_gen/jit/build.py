@@ -139,7 +139,7 @@ def place_of(name: str) -> str:
     """Path in a folder of the user of a file of a model: derived code and what all models share lie apart."""
     if not name.endswith(SUFFIXES):
         return name
-    shared = name in runtime_sources(gradients=True) or name in (ENTRY, "msfp.h") or name.endswith(".pyx")
+    shared = name in {path.name for path in _runtime()} or name in (ENTRY, "msfp.h") or name.endswith(".pyx")
     return f"{'runtime' if shared else 'derived'}/{name}"
 
 
@@ -176,15 +176,28 @@ def load_extension(path: Path, module: str) -> ModuleType:
     return extension
 
 
-def runtime_sources(gradients: bool = False) -> dict[str, str]:
+def runtime_sources(spec: ModelSpec) -> dict[str, str]:
     """Hand-written C files that are compiled with a model: file name, without its folder -> text.
 
-    gradients: with those that only models with gradients have. Names are unique across the folders, so that generated
-    sources lie in one folder.
+    Names are unique across the folders, so that generated sources lie in one folder.
     """
-    files = sorted((cache.PACKAGE / "runtime").rglob("*.[ch]"))
-    files = [path for path in files if gradients or path.parent.name != "gradients"]
+    effects = spec.effects
+    asked = {  # a file, or all of a folder
+        "gradients": spec.gradients,
+        "port": effects.permits_moving_ends,
+        "port.h": True,
+        "two_port.c": effects.permits_moving_ends,
+        "dopri5.c": effects.permits_dopri5,
+        "memory.c": effects.law is not None and effects.law.memory is not None,
+        "contact_unilateral.c": effects.uplift,
+    }
+    files = (path for path in _runtime() if asked.get(path.name, asked.get(path.parent.name, True)))
     return {path.name: path.read_text(encoding="utf-8") for path in files}
+
+
+def _runtime() -> list[Path]:
+    """All hand-written C files."""
+    return sorted((cache.PACKAGE / "runtime").rglob("*.[ch]"))
 
 
 def entry_source(module: str) -> str:
@@ -255,7 +268,7 @@ def _build(spec: ModelSpec, entry: cache.Entry, folder: Path, notify: Progress) 
 
     notify(f"deriving and emitting {spec.key}", 0.0)
     generated = generate(spec)
-    sources = {**runtime_sources(spec.gradients), **generated.files, ENTRY: entry_source(entry.module)}
+    sources = {**runtime_sources(spec), **generated.files, ENTRY: entry_source(entry.module)}
     begin = perf_counter()
     extension = compile_extension(
         sources,

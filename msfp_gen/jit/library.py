@@ -91,7 +91,7 @@ def build_shared(
 
     compiler = find_compiler()
     progress(f"deriving and emitting {spec.key}", 0.0)
-    files = {**runtime_sources(), **generate(spec).files, **others}
+    files = {**runtime_sources(spec), **generate(spec).files, **others}
     files = {file: text for file, text in sorted(files.items()) if file.endswith((".c", ".h"))}
     for file, text in files.items():
         write_text(folder / file, text)
@@ -125,7 +125,7 @@ def _write_sources(
     sources: dict[str, dict[str, str]] = {}
     for i, spec in enumerate(specs):
         progress(f"deriving and emitting {spec.key}", GENERATION_SHARE * i / len(specs))
-        files = {**runtime_sources(), **generate(spec).files}
+        files = {**runtime_sources(spec), **generate(spec).files}
         sources[model_name(spec)] = {name: text for name, text in sorted(files.items()) if name.endswith((".c", ".h"))}
     for model, files in sources.items():
         (folder / model).mkdir()

@@ -236,7 +236,7 @@ def wasm_module(spec: ModelSpec) -> bytes:
     if zig is None:
         raise CompileError("the explorer needs ziglang, a compiler for WebAssembly: pip install ziglang")
     generated = {name: text for name, text in generate(spec).files.items() if name.endswith((".c", ".h"))}
-    sources = {**runtime_sources(), **generated, GLUE: asset(f"explorer/{GLUE}")}
+    sources = {**runtime_sources(spec), **generated, GLUE: asset(f"explorer/{GLUE}")}
     flags = [flag for flag in FLAGS["c"] if flag not in NATIVE]
     units = sorted(name for name in sources if name.endswith(".c"))
     with TemporaryDirectory() as folder:

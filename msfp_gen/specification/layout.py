@@ -175,8 +175,15 @@ class Effects:
 
     @property
     def permits_moving_ends(self) -> bool:
-        """Whether a bearing can be a two-port, whose ends another program moves: in space, with locked spin."""
-        return self.dimension == "spatial" and self.spin == "locked"
+        """Whether a bearing can be a two-port, whose ends another program moves: in space, with locked spin, where the
+        support of the top plate rotates.
+        """
+        return self.top_rotation and self.dimension == "spatial" and self.spin == "locked"
+
+    @property
+    def permits_dopri5(self) -> bool:
+        """Whether runs can take the method of the report, which integrates accelerations of closed stacks."""
+        return self.sliders == "inertial" and not self.uplift
 
     @property
     def permits_quasistatic_steps(self) -> bool:

@@ -26,7 +26,7 @@ extern "C" {
 #endif
 
 /* Rises with every change of this file that a compiled program notices. */
-#define MSFP_ABI_VERSION 3
+#define MSFP_ABI_VERSION 4
 
 /* How a run or an evaluation ended. */
 enum msfp_status {
@@ -385,7 +385,9 @@ typedef struct msfp_api {
     /* End 0 holds the base, end 1 the far side of the interface: the springs and dampers of the top. The motion of the ends
      * at one time is ends [end][order][6]: displacements along E1..E3 since the start [m] and rotation vector [rad], then
      * their rates, then their accelerations. A wrench [end][6] is the force [N] and the moment [N m] that the end exerts on
-     * the bearing, about the present position of that end. The model is in space, with locked spin and top rotation. */
+     * the bearing, about the present position of that end. The model is in space, with locked spin and top rotation: others have no
+     * two-ports, and NULL in place of these functions but port_new, port_new_loaded, which refuse, port_free and
+     * port_method. */
     /* A bearing that is centred and at rest at start_time, under the compression axial_load [N]. Of the scene: bearing,
      * whose top is the interface, start_time, q (separations alone), method, rtol, atol_angle, max_step, first_step, and
      * max_steps, the limit of one trial, and the monitors; end_time is not read, the rest is as of scene_default. The
@@ -456,8 +458,8 @@ typedef struct msfp_api {
     /* ---- further functions of the two-port ---- */
     /* A two-port whose upper end is free: force in, motion out. The top is a supported mass;
      * ends[1] is force [N] and moment [N m] on the top plate at r_nn beside the weight, with two
-     * derivatives, and the wrench of end 1 is that load. Motions are in the row. The model is in
-     * space, with locked spin and without top rotation; the rest as of port_new. */
+     * derivatives, and the wrench of end 1 is that load. Motions are in the row; the rest as of
+     * port_new. The support of its springs is at rest. */
     int (*port_new_loaded)(const msfp_scene *scene, msfp_port **port, const char **message);
     /* As port_derivative, with derivatives [row_size + 6][12] of the row at the end of the trial: of q, v, a, f, normal,
      * sliding, force, base, top, top_force and top_moment, those of other numbers are zero; then of velocity and

@@ -350,8 +350,9 @@ def test_constant_friction_emits_nothing_of_a_law() -> None:
     header = files["msfp_model.h"]
     assert "#define MSFP_LAW 0 " in header and "#define MSFP_MEMORY 0 " in header
     assert "coefficient[" not in header and "MSFP_SURFACE_PARAMETERS_HEATING" not in header
-    with_heat = generate(ModelSpec(Layout.tfp(), Effects(friction="pvt"))).files
-    assert "#define MSFP_MEMORY 14 " in with_heat["msfp_model.h"] and "memory.c" in runtime_sources()
+    heated = ModelSpec(Layout.tfp(), Effects(friction="pvt"))
+    assert "#define MSFP_MEMORY 14 " in generate(heated).files["msfp_model.h"]
+    assert "memory.c" in runtime_sources(heated) and "memory.c" not in runtime_sources(ModelSpec(Layout.tfp()))
 
 
 def worn(**solver: Any) -> Scene:

@@ -326,8 +326,10 @@ def run_cases(b: Bench) -> Iterator[Case]:
         yield f"snapshot cut {share}", lambda x=share: on_run(lambda run: cut(run, x))
     yield "snapshot NULL", lambda: on_run(lambda run: api.snapshot_read(run, None, 1000))
     yield "hold rows 0", lambda: on_run(lambda run: api.run_hold_rows(run, 2**64 - 1) or 0)
+    yield "run_record NULL", lambda: (api.run_record(None), None, True)
+    if not api.has("port_commit"):
+        return
     for call, count in (
-        ("run_record", 1),
         ("port_commit", 1),
         ("port_wrench", 2),
         ("port_row", 2),

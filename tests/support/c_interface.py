@@ -44,6 +44,10 @@ class Interface:
         value = getattr(self._table, name)
         return self._functions[name](value) if name in self._functions else value
 
+    def has(self, function: str) -> bool:
+        """Whether the table has a function, and not NULL."""
+        return bool(getattr(self._table, function))
+
     def new(self, struct: str) -> Any:
         """A struct of zeros."""
         return self.structs[struct]()

@@ -24,8 +24,8 @@ def text(name: str, layout: tuple[int, int, int] = (5, 2, 2), **effects: object)
 
 def warnings_of(effects: dict[str, object], folder: Path, *mode: str) -> str:
     """What the compiler has to say about all C of a TFP with these effects; nothing, it is hoped."""
-    generated = generate(ModelSpec(Layout.tfp(), Effects(**effects)))  # type: ignore[arg-type]
-    sources = runtime_sources() | generated.files
+    spec = ModelSpec(Layout.tfp(), Effects(**effects))  # type: ignore[arg-type]
+    sources = runtime_sources(spec) | generate(spec).files
     for name, content in sources.items():
         (folder / name).write_text(content, encoding="utf-8")
     units = sorted(name for name in sources if name.endswith(".c"))

@@ -17,15 +17,19 @@ struct msfp_bearing {
 int msfp_check_bearing(double gravity, const double *bodies, const double *surfaces, const double *top,
                        const char **message);
 int msfp_check_scene(const msfp_scene *scene, const char **message);
+#if MSFP_MOVING_ENDS
 int msfp_check_port(const msfp_scene *scene, double axial_load, const char **message);
 /* Of a state that a port of another model has reached. */
 int msfp_check_entry(const msfp_port *port, const msfp_scene *state, const double *ends);
 int msfp_check_port_loaded(const msfp_scene *scene, const char **message);
 /* Also the status of a two-port that has failed at its start. */
 int msfp_check_trial(const msfp_port *port, double time, const double *ends, const char **message);
+uint64_t msfp_port_identity(const msfp_scene *scene, double axial_load, int loaded);
+#else
+void msfp_port_free(msfp_port *port); /* there is none */
+#endif
 /* Numbers that tell what a run, or a two-port, computes from, as long as histories are not changed; not 0. */
 uint64_t msfp_identity(const msfp_scene *scene);
-uint64_t msfp_port_identity(const msfp_scene *scene, double axial_load, int loaded);
 #if MSFP_GRADIENTS
 int msfp_check_gradients(const msfp_run *run, const msfp_gradient_inputs *inputs);
 #endif
@@ -58,6 +62,8 @@ int msfp_api_run_record(msfp_run *run);
 int msfp_api_run_advance(msfp_run *run, long steps);
 void msfp_api_run_on_rows(msfp_run *run, msfp_row_callback callback, void *user);
 
+int msfp_api_port_method(int method, msfp_method_stages *stages);
+
 /* What the scene says of solver, rows and monitors. */
 msfp_options msfp_scene_options(const msfp_scene *scene);
 
@@ -77,13 +83,13 @@ int msfp_api_gradients_start(msfp_run *run, const msfp_gradient_inputs *inputs);
 #endif
 int msfp_api_snapshot_open(const void *snapshot, size_t size, msfp_run **run);
 
-/* ---- two_port.c ---- */
+/* ---- two_port.c; in models that are no two-ports the first two, of checks.c, refuse ---- */
 
 int msfp_api_port_new(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message);
+int msfp_api_port_new_loaded(const msfp_scene *scene, msfp_port **port, const char **message);
 int msfp_api_port_trial(msfp_port *port, double time, const double *ends, const char **message);
 int msfp_api_port_wrench(const msfp_port *port, double *wrench);
 int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative);
-int msfp_api_port_new_loaded(const msfp_scene *scene, msfp_port **port, const char **message);
 int msfp_api_port_row_derivative(msfp_port *port, const double *direction, double *derivative, double *rows);
 int msfp_api_port_row(const msfp_port *port, double *row);
 void msfp_api_port_progress(const msfp_port *port, msfp_progress *trial);
@@ -91,7 +97,6 @@ void msfp_api_port_counts(const msfp_port *port, int64_t *counts);
 double msfp_api_port_time(const msfp_port *port);
 int msfp_api_port_commit(msfp_port *port);
 int msfp_api_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size);
-int msfp_api_port_method(int method, msfp_method_stages *stages);
 int msfp_api_port_step_begin(msfp_port *port, double step, const double *expected);
 int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *wrench);
 int msfp_api_port_stage_derivative(msfp_port *port, double *derivative);

@@ -214,7 +214,7 @@ static int check_values(const msfp_scene *s, const char **message)
         const int value = integer_at(s, switches[i].at);
         REQUIRE(value >= 0 && value <= switches[i].most, switches[i].message);
     }
-    REQUIRE(s->method != MSFP_METHOD_DOPRI5 || !(MSFP_MASSLESS || MSFP_UPLIFT),
+    REQUIRE(s->method != MSFP_METHOD_DOPRI5 || MSFP_DOPRI5,
             "method: MSFP_METHOD_DOPRI5 is for models with masses and without uplift; use MSFP_METHOD_IMPLICIT");
     REQUIRE(s->max_step == 0.0 || s->first_step <= s->max_step, "first_step: give at most max_step [s]");
     REQUIRE(s->law_temperature[0] <= s->law_temperature[1], "law_temperature: give a range of temperatures [degC]");
@@ -289,6 +289,41 @@ uint64_t msfp_identity(const msfp_scene *s)
     return sum ? sum : 1; /* 0: of any scene */
 }
 
+#if MSFP_GRADIENTS
+/* Whether an index into derivatives of a history is one, -1: zero; one history of each parameter at most. */
+static int valid_column(double index, int count, const double *coefficients, size_t size)
+{
+    if (!(index >= -1.0 && index < count && floor(index) == index))
+        return 0;
+    return index < 0.0 || (coefficients && msfp_all_finite(coefficients + (size_t)index * size, size));
+}
+
+int msfp_check_gradients(const msfp_run *run, const msfp_gradient_inputs *in)
+{
+    if (!run || run->gradients || run->counts[MSFP_COUNT_STEPS] || run->callback || !in || in->count < 0 ||
+        in->count > MOST_ITEMS || in->step_count < 0 || in->step_count > MOST_ITEMS ||
+        (in->step_count && !(in->steps && rising(in->steps, in->step_count, 1) && in->steps[0] > run->now.t)))
+        return MSFP_E_ARGUMENT;
+    const struct {
+        const double *values;
+        size_t of_each;
+    } arrays[] = { { in->gravity, 1 },    { in->bodies, (NB + 1) * MSFP_BODY_VALUES_SIZE }, { in->surfaces, NB * MSFP_SURFACE_VALUES_SIZE },
+                   { in->top, MSFP_TOP_VALUES_SIZE }, { in->q, NB * MSFP_NQ }, { in->v, NB * MSFP_NQ }, { in->f, NB * 2 },
+                   { in->motion, 1 },     { in->load, 1 } };
+    for (size_t i = 0; in->count && i < COUNT(arrays); ++i)
+        if (!arrays[i].values || !msfp_all_finite(arrays[i].values, arrays[i].of_each * (size_t)in->count))
+            return MSFP_E_ARGUMENT;
+    const size_t motion = (size_t)run->motion.pieces * 6 * (MSFP_DEGREE + 1), load = (size_t)run->load.pieces * 6 * (MSFP_DEGREE + 1);
+    for (int i = 0; i < in->count; ++i)
+        if (!valid_column(in->motion[i], in->count, in->motions, motion) || !valid_column(in->load[i], in->count, in->loads, load))
+            return MSFP_E_ARGUMENT;
+    return MSFP_OK;
+}
+#endif
+
+/* ---- the two-port ---- */
+
+#if MSFP_MOVING_ENDS
 uint64_t msfp_port_identity(const msfp_scene *s, double axial_load, int loaded)
 {
     msfp_scene fixed = *s;
@@ -296,18 +331,14 @@ uint64_t msfp_port_identity(const msfp_scene *s, double axial_load, int loaded)
     return hash_number(hash_number(msfp_identity(&fixed), axial_load), loaded);
 }
 
-/* ---- the two-port ---- */
-
 static int check_interface(const double *top, const char **message)
 {
     const double values[MSFP_TOP_VALUES_SIZE] = { [MSFP_TOP_VALUES_STIFFNESS] = top[MSFP_TOP_PARAMETERS_K],
                                              [MSFP_TOP_VALUES_VERTICAL_STIFFNESS] = top[MSFP_TOP_PARAMETERS_KV],
                                              [MSFP_TOP_VALUES_ROTATIONAL_STIFFNESS] = top[MSFP_TOP_PARAMETERS_KR] };
     REQUIRE(top[MSFP_TOP_PARAMETERS_M] == 0.0, "bearing: top: a two-port supports no mass; give mass = 0");
-#if !MSFP_PLANAR /* others were refused */
     REQUIRE(top[MSFP_TOP_PARAMETERS_X0X] == 0.0 && top[MSFP_TOP_PARAMETERS_X0Y] == 0.0,
             "bearing: top: the upper end is the anchor of a two-port; give anchor_x = anchor_y = 0");
-#endif
     return CHECK(msfp_interface_ranges, values);
 }
 
@@ -342,8 +373,6 @@ int msfp_check_port(const msfp_scene *s, double axial_load, const char **message
         *message = NULL;
     REQUIRE(s, "scene: give a scene");
     REQUIRE(s->bearing, "bearing: give a bearing of bearing_new");
-    REQUIRE(!MSFP_PLANAR && MSFP_SPIN_LOCKED && MSFP_TOP_ROTATION,
-            "bearing: give one of a model for two-ports; export it with --top-rotation, in space, with locked spin");
     int status = CHECK(msfp_axial_load_ranges, &axial_load);
     status = status ? status : check_ends(s, message);
     return status ? status : check_interface(s->bearing->parameters.top, message);
@@ -367,44 +396,10 @@ int msfp_check_port_loaded(const msfp_scene *s, const char **message)
         *message = NULL;
     REQUIRE(s, "scene: give a scene");
     REQUIRE(s->bearing, "bearing: give a bearing of bearing_new");
-    REQUIRE(!MSFP_PLANAR && MSFP_SPIN_LOCKED && !MSFP_TOP_ROTATION,
-            "bearing: give one of a model in space, with locked spin and without top rotation");
     const double *top = s->bearing->parameters.top;
     REQUIRE(top[MSFP_TOP_PARAMETERS_M] > 0.0, "bearing: top: give the supported mass above 0");
     return check_ends(s, message);
 }
-
-#if MSFP_GRADIENTS
-/* Whether an index into derivatives of a history is one, -1: zero; one history of each parameter at most. */
-static int valid_column(double index, int count, const double *coefficients, size_t size)
-{
-    if (!(index >= -1.0 && index < count && floor(index) == index))
-        return 0;
-    return index < 0.0 || (coefficients && msfp_all_finite(coefficients + (size_t)index * size, size));
-}
-
-int msfp_check_gradients(const msfp_run *run, const msfp_gradient_inputs *in)
-{
-    if (!run || run->gradients || run->counts[MSFP_COUNT_STEPS] || run->callback || !in || in->count < 0 ||
-        in->count > MOST_ITEMS || in->step_count < 0 || in->step_count > MOST_ITEMS ||
-        (in->step_count && !(in->steps && rising(in->steps, in->step_count, 1) && in->steps[0] > run->now.t)))
-        return MSFP_E_ARGUMENT;
-    const struct {
-        const double *values;
-        size_t of_each;
-    } arrays[] = { { in->gravity, 1 },    { in->bodies, (NB + 1) * MSFP_BODY_VALUES_SIZE }, { in->surfaces, NB * MSFP_SURFACE_VALUES_SIZE },
-                   { in->top, MSFP_TOP_VALUES_SIZE }, { in->q, NB * MSFP_NQ }, { in->v, NB * MSFP_NQ }, { in->f, NB * 2 },
-                   { in->motion, 1 },     { in->load, 1 } };
-    for (size_t i = 0; in->count && i < COUNT(arrays); ++i)
-        if (!arrays[i].values || !msfp_all_finite(arrays[i].values, arrays[i].of_each * (size_t)in->count))
-            return MSFP_E_ARGUMENT;
-    const size_t motion = (size_t)run->motion.pieces * 6 * (MSFP_DEGREE + 1), load = (size_t)run->load.pieces * 6 * (MSFP_DEGREE + 1);
-    for (int i = 0; i < in->count; ++i)
-        if (!valid_column(in->motion[i], in->count, in->motions, motion) || !valid_column(in->load[i], in->count, in->loads, load))
-            return MSFP_E_ARGUMENT;
-    return MSFP_OK;
-}
-#endif
 
 int msfp_check_trial(const msfp_port *port, double time, const double *ends, const char **message)
 {
@@ -422,3 +417,28 @@ int msfp_check_trial(const msfp_port *port, double time, const double *ends, con
         REQUIRE(ends[i] == from[i], "time: give a later one; at that of the committed state the ends are elsewhere");
     return MSFP_OK;
 }
+#else
+static int no_port(msfp_port **port, const char **message)
+{
+    if (port)
+        *port = NULL;
+    REQUIRE(port, "port: give the address of a handle");
+    return msfp_refuse(message, "bearing: give one of a model for two-ports; export it with --top-rotation, in space, with "
+                                "locked spin");
+}
+
+int msfp_api_port_new(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message)
+{
+    (void)scene;
+    (void)axial_load;
+    return no_port(port, message);
+}
+
+int msfp_api_port_new_loaded(const msfp_scene *scene, msfp_port **port, const char **message)
+{
+    (void)scene;
+    return no_port(port, message);
+}
+
+void msfp_port_free(msfp_port *port) { (void)port; }
+#endif

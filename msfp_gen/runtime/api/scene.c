@@ -144,3 +144,17 @@ void msfp_api_run_on_rows(msfp_run *run, msfp_row_callback callback, void *user)
     run->callback = callback;
     run->user = user;
 }
+
+int msfp_api_port_method(int method, msfp_method_stages *stages)
+{
+    if (method < 0 || method >= MSFP_METHODS || method == MSFP_METHOD_DOPRI5 || !stages)
+        return MSFP_E_ARGUMENT;
+    const msfp_tableau *tableau = msfp_tableau_of(method);
+    stages->count = tableau->stages;
+    stages->diagonal = tableau->gamma;
+    stages->order = tableau->order;
+    memcpy(stages->weights, tableau->a, sizeof stages->weights);
+    memcpy(stages->shares, tableau->c, sizeof stages->shares);
+    memcpy(stages->errors, tableau->e, sizeof stages->errors);
+    return MSFP_OK;
+}

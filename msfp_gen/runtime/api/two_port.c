@@ -113,20 +113,6 @@ int msfp_api_port_snapshot_read(msfp_port *port, const void *snapshot, size_t si
 
 /* ---- steps by stages ---- */
 
-int msfp_api_port_method(int method, msfp_method_stages *stages)
-{
-    if (method < 0 || method >= MSFP_METHODS || method == MSFP_METHOD_DOPRI5 || !stages)
-        return MSFP_E_ARGUMENT;
-    const msfp_tableau *tableau = msfp_tableau_of(method);
-    stages->count = tableau->stages;
-    stages->diagonal = tableau->gamma;
-    stages->order = tableau->order;
-    memcpy(stages->weights, tableau->a, sizeof stages->weights);
-    memcpy(stages->shares, tableau->c, sizeof stages->shares);
-    memcpy(stages->errors, tableau->e, sizeof stages->errors);
-    return MSFP_OK;
-}
-
 int msfp_api_port_step_begin(msfp_port *port, double step, const double *expected)
 {
     if (!port)

@@ -4,8 +4,6 @@
 #include "equations.h"
 #include "msfp_kernels.h"
 
-#if MSFP_UPLIFT
-
 /* Penetration of surface j, and whether it stands on the edge of its footprint. */
 static void depth(const msfp_parameters *p, const msfp_work *w, int j, double *block)
 {
@@ -33,12 +31,3 @@ void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j)
     else
         msfp_unilateral_inside(p->surface[j], slider, w->x[j + 1], w->unilateral[j]);
 }
-#else
-double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
-{
-    (void)p;
-    (void)w;
-    (void)j;
-    return 1.0;
-}
-#endif

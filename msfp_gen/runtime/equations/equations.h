@@ -84,14 +84,16 @@ void msfp_support(const msfp_point *at, double *support);
 void msfp_support_axis(const msfp_point *at, double *upright);
 #endif
 
+#if MSFP_MOVING_ENDS
 /* Angles psi, theta, phi (2.1) of a rotation vector, with two derivatives in time: both [order][3]. */
 void msfp_end_angles(const double rotation[3][3], double angles[3][3]);
+#endif
 
 /* ---- contact_unilateral.c ---- */
 
-/* Compression of the unilateral contact of surface j [m]; negative where it is open. 1 in models without uplift. */
-double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j);
 #if MSFP_UPLIFT
+/* Compression of the unilateral contact of surface j [m]; negative where it is open. */
+double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j);
 enum { MSFP_OPEN, MSFP_ON_FACE, MSFP_ON_EDGE }; /* how a slider stands on its footprint */
 /* Unilateral contact of surface j, zero where it is open or its damping would pull. */
 void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j);

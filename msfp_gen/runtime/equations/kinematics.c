@@ -131,6 +131,7 @@ void msfp_support_axis(const msfp_point *at, double *upright)
 }
 #endif
 
+#if MSFP_MOVING_ENDS
 void msfp_end_angles(const double rotation[3][3], double angles[3][3])
 {
     int turned = 0;
@@ -141,6 +142,7 @@ void msfp_end_angles(const double rotation[3][3], double angles[3][3])
     else
         memset(&angles[0][0], 0, MSFP_ROTATION_ANGLES_SIZE * sizeof **angles);
 }
+#endif
 
 int msfp_top_is_sprung(const msfp_parameters *p)
 {

@@ -12,7 +12,6 @@
 #include <string.h>
 #include "port.h"
 
-#if MSFP_MOVING_ENDS
 #include "msfp_by_ends.h"
 
 enum { W = MSFP_PORT_FREEDOMS, EACH = MSFP_END_FREEDOMS };
@@ -76,10 +75,8 @@ static void move_top(const msfp_port *port, const msfp_work *w, columns (*of)[EA
     }
     memcpy(d->far_end + MSFP_FAR_END_UX * W, of[0], 3 * sizeof(columns));
     memcpy(d->far_end + MSFP_FAR_END_VX * W, of[1], 3 * sizeof(columns));
-#if MSFP_TOP_ROTATION
     memcpy(d->support + MSFP_SUPPORT_PSI * W, of[0] + 3, PAIR * sizeof(columns));
     memcpy(d->support + MSFP_SUPPORT_PSI1 * W, of[1] + 3, PAIR * sizeof(columns));
-#endif
     msfp_interface_by_ends(&port->run.parameters, w, s, d);
 }
 
@@ -202,9 +199,7 @@ static void blocks_of(const msfp_port *port, msfp_stage *stage, msfp_work *w, ms
     msfp_set_inputs(&port->run.parameters, &stage->at, &weights, w, s);
     msfp_far_end(port, at->of[1][0], at->of[1][1], at->of[1][0], s->far_end);
     s->g = stage->g;
-#if MSFP_TOP_ROTATION
     msfp_support(&stage->at, s->support);
-#endif
 }
 
 /* The steps of the trial once more, with their derivatives; of balances and wrenches at its end. */
@@ -357,14 +352,3 @@ int msfp_port_stage_derivative(msfp_port *port, double *derivative)
         memcpy(derivative + i * EACH, d.upper + i * W + EACH, EACH * sizeof *derivative);
     return msfp_all_finite(derivative, EACH * EACH) ? MSFP_OK : MSFP_E_FINITE;
 }
-#else /* no bearing of this model is a two-port (msfp_check_port) */
-int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative, double *rows)
-{
-    return (void)port, (void)direction, (void)derivative, (void)rows, MSFP_E_ARGUMENT;
-}
-
-int msfp_port_stage_derivative(msfp_port *port, double *derivative)
-{
-    return (void)port, (void)derivative, MSFP_E_ARGUMENT;
-}
-#endif

@@ -110,14 +110,12 @@ void msfp_port_paths(msfp_port *port, const msfp_parameters *p, double t, double
         return;
     }
     interface_path(port, p, to, h, &port->load);
-#if MSFP_TOP_ROTATION
     motion_paths(port->from.of[1][0], to->of[1][0], h, &port->support);
     for (int piece = 0; piece < MSFP_PORT_PIECES; ++piece) { /* psi, theta; the interface does not transmit torsion */
         double(*channels)[MSFP_DEGREE + 1] = port->support.coefficients[piece];
         memcpy(channels[0], channels[3], 2 * sizeof *channels);
         memset(channels[2], 0, 4 * sizeof *channels);
     }
-#endif
 }
 
 /* ---- the interface and the wrenches ---- */
@@ -157,9 +155,7 @@ void msfp_port_histories(msfp_port *port, const msfp_ends *to, double h)
     msfp_run *run = &port->committed;
     msfp_port_paths(port, &run->parameters, run->now.t, run->now.t + h, to);
     run->motion.held = run->load.held = 0;
-#if MSFP_TOP_ROTATION
     run->support.held = 0;
-#endif
 }
 
 void msfp_port_hold(msfp_port *port)

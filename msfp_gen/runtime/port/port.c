@@ -17,9 +17,7 @@ static void attach_all(msfp_port *port, msfp_run *run)
 {
     msfp_attach(&run->motion, port->knots, &port->motion);
     msfp_attach(&run->load, port->knots, &port->load);
-#if MSFP_TOP_ROTATION
     msfp_attach(&run->support, port->knots, &port->support);
-#endif
 }
 
 /* The state of `to` becomes that of `from`; rows and events stay apart. */
@@ -37,9 +35,7 @@ static int begin(msfp_port *port, const msfp_parameters *p, const msfp_options *
     msfp_history motion, load, support = { 0 };
     msfp_attach(&motion, port->knots, &port->motion);
     msfp_attach(&load, port->knots, &port->load);
-#if MSFP_TOP_ROTATION
     msfp_attach(&support, port->knots, &port->support);
-#endif
     const int status = msfp_run_start(&port->committed, p, &motion, &load, &support, NULL, 0, options, q, v, f);
     port->committed.identity = identity;
     port->run = port->committed;

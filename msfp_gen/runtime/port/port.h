@@ -14,6 +14,7 @@
 #define MSFP_PORT_H
 #include "run.h"
 
+#if MSFP_MOVING_ENDS /* nothing of it is compiled into models that are no two-ports */
 enum { MSFP_NO_STEP = -1 };
 enum { MSFP_ENDS = 2, MSFP_ORDERS = 3, MSFP_END_FREEDOMS = 6, MSFP_PORT_FREEDOMS = MSFP_ENDS * MSFP_END_FREEDOMS };
 
@@ -53,9 +54,7 @@ struct msfp_port {
     double wrench[MSFP_PORT_FREEDOMS]; /* of the committed state: stages that are given up change committed.work */
     double knots[MSFP_PORT_PIECES + 1]; /* of the trial, and any later one [s] */
     msfp_polynomials motion, load;
-#if MSFP_TOP_ROTATION
     msfp_polynomials support;
-#endif
     int loaded;        /* end B is free */
     double axial_load; /* that the interface carries at rest [N] */
     double plate[3];   /* r_nn at rest, where end B is with u = 0 [m] */
@@ -164,4 +163,5 @@ double msfp_port_springs(const msfp_port *port, const msfp_run *run, const msfp_
  * r_nn. Returns MSFP_OK or a status, after which nothing was written. */
 int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative, double *rows);
 
+#endif
 #endif

@@ -18,12 +18,10 @@ static void set_ends(const msfp_port *port, const msfp_ends *ends, msfp_point *a
     msfp_far_end(port, ends->of[1][0], ends->of[1][1], port->step.anchor, far_end);
     msfp_load_of_interface(&port->committed.parameters, far_end, at->load);
     msfp_end_channels(ends->of[0][0], at->base[0]);
-#if MSFP_TOP_ROTATION
     double upper[MSFP_ORDERS][MSFP_END_FREEDOMS];
     msfp_end_channels(ends->of[1][0], upper[0]);
     for (int order = 0; order < 2; ++order)
         memcpy(at->support[order], upper[order] + 3, 3 * sizeof(double));
-#endif
 }
 
 void msfp_port_step_begin(msfp_port *port, double h, const double *expected)

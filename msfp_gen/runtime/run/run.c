@@ -140,15 +140,23 @@ static double latest_end(msfp_run *run)
     return end;
 }
 
-/* One step of length h of the method; it is not accepted yet. A prescribed step repeats one of another run, so that
+/* One step of length h of the method. */
+static int step_of_method(msfp_run *run, double h, double *error)
+{
+#if MSFP_DOPRI5 /* other models refuse it */
+    if (run->options.method == MSFP_METHOD_DOPRI5)
+        return msfp_step_dopri5(run, h, error);
+#endif
+    return msfp_is_quasistatic(run) ? msfp_step_quasistatic(run, h, error) : msfp_step_implicit(run, h, error);
+}
+
+/* The same, with what a step must satisfy; it is not accepted yet. A prescribed step repeats one of another run, so that
  * derivatives follow by differences: it is not refused for its energy balance. */
 static int try_step(msfp_run *run, double h, int prescribed, double *error)
 {
     run->status_surface = 0;
     run->status_value = 0.0;
-    const int status = run->options.method == MSFP_METHOD_DOPRI5 ? msfp_step_dopri5(run, h, error)
-                       : msfp_is_quasistatic(run)           ? msfp_step_quasistatic(run, h, error)
-                                                            : msfp_step_implicit(run, h, error);
+    const int status = step_of_method(run, h, error);
     if (status)
         return status;
     if (!(*error < INFINITY))

@@ -166,7 +166,9 @@ void msfp_stages_end(msfp_run *run, msfp_stages *s, double *error);
 /* ---- the methods; error: of the step over its tolerance [-] ---- */
 
 int msfp_step_implicit(msfp_run *run, double h, double *error);
+#if MSFP_DOPRI5
 int msfp_step_dopri5(msfp_run *run, double h, double *error);
+#endif
 int msfp_step_quasistatic(msfp_run *run, double h, double *error);
 /* Whether the run takes quasi-static steps. */
 int msfp_is_quasistatic(const msfp_run *run);

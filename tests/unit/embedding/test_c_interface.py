@@ -22,6 +22,7 @@ from support.example import example_bearing
 
 from msfp_gen import Effects, InputError, Layout, Motion, Scene, Solver, Top, build_model
 from msfp_gen.embedding import values
+from msfp_gen.generator.interface import functions, public_header
 from msfp_gen.model.model import Model
 from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.specification import contract
@@ -355,6 +356,20 @@ def test_a_snapshot_of_another_two_port_is_refused() -> None:
         assert word == ("ok" if name in ("same", "start") else "snapshot"), name
         b.api.port_free(other)
     b.api.port_free(first)
+
+
+def test_a_model_without_two_ports_refuses_them() -> None:
+    """Nothing of the two-port is compiled into it: what makes one refuses, and the rest is not there."""
+    b = bench_of(model_of((5, 2, 2)))
+    scene, handle, message = b.port_scene(), ctypes.c_void_p(1), ctypes.c_char_p()
+    refused = "bearing: give one of a model for two-ports; export it with --top-rotation, in space, with locked spin"
+    for new, more in ((b.api.port_new, (1e5,)), (b.api.port_new_loaded, ())):
+        status = new(ctypes.addressof(scene), *more, ctypes.addressof(handle), ctypes.addressof(message))
+        assert b.api.word(status) == "argument" and message.value == refused.encode() and handle.value is None
+    b.api.port_free(None)
+    names = {name for name in functions(public_header()) if name.startswith("port_")}
+    assert {name for name in names if b.api.has(name)} == {"port_new", "port_new_loaded", "port_free", "port_method"}
+    assert all(bench_of(port().model).api.has(name) for name in names)
 
 
 def test_calls_without_a_handle_or_a_place_are_refused() -> None:

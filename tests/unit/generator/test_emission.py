@@ -14,6 +14,7 @@ from msfp_gen import Effects, InputError, Layout
 from msfp_gen.common.version import __version__
 from msfp_gen.generator import generate
 from msfp_gen.generator.emit import FILES, TWO_PORT_FILES
+from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS
 from msfp_gen.specification.layout import ModelSpec
 
@@ -99,7 +100,7 @@ def test_generating_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(Path, "write_text", refuse)
     monkeypatch.setattr(Path, "mkdir", refuse)
-    generated = generate(ModelSpec(Layout(2, 1, 0)))
+    generated = generate(ModelSpec(Layout(2, 1, 0), Effects(top_rotation=True)))
     assert sorted(generated.files) == sorted([*FILES, *TWO_PORT_FILES, "msfp_2_1_0.h"])
     assert not list(tmp_path.iterdir())
 
@@ -111,8 +112,8 @@ def test_generating_twice_gives_the_same_text() -> None:
 
 @pytest.mark.parametrize("name", [*FILES, *TWO_PORT_FILES, "msfp_5_2_2.h"])
 def test_each_file_carries_its_stamp(name: str) -> None:
-    head = "\n".join(text(name).splitlines()[:4])
-    spec = ModelSpec(Layout.tfp())
+    head = "\n".join(text(name, top_rotation=True).splitlines()[:4])
+    spec = ModelSpec(Layout.tfp(), Effects(top_rotation=True))
     assert name in head and __version__ in head and "Do not edit" in head
     assert (spec.key in head) == (name not in ("msfp_module.pyx", "msfp.h"))  # these are the same for every model
 
@@ -200,3 +201,20 @@ def test_no_function_is_long() -> None:
     lengths = {name: body.count("\n") for name, body in functions(text("msfp_kernels.h", spin="patch")).items()}
     assert len(lengths) > 10
     assert max(lengths.values()) < LONGEST, max(lengths, key=lengths.__getitem__)
+
+
+def test_what_no_scene_of_a_model_can_ask_for_is_not_compiled() -> None:
+    """Two-ports with a rotating top, the report's method with masses and closed surfaces, unilateral contacts."""
+
+    def files(**effects: object) -> set[str]:
+        spec = ModelSpec(Layout.tfp(), Effects(**effects))  # type: ignore[arg-type]
+        return {*runtime_sources(spec), *generate(spec).files}
+
+    ports = {"port.c", "ends.c", "stage.c", "derivatives.c", "two_port.c", "msfp_by_ends.h"}
+    every = files(top_rotation=True, uplift=True, friction="pvt") | files(top_rotation=True)
+    assert ports | {"dopri5.c", "contact_unilateral.c", "memory.c"} <= every
+    assert every - files() == ports | {"contact_unilateral.c", "memory.c"}
+    assert every - files(uplift=True) >= ports | {"dopri5.c"}
+    assert "dopri5.c" not in files(sliders="massless") and not ports & files(top_rotation=True, dimension="planar")
+    kernels = text("msfp_kernels.h")
+    assert not [word for word in ("rotation_angles", "far_end", "end_wrench", "locking") if word in kernels]

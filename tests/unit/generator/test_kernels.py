@@ -42,7 +42,7 @@ class Kernels:
                 output_is_stored = ["out"] if DIFFERENTIATED[program.name] else []
                 moved = [*blocks, *output_is_stored, *(f"d{name}" for name in [*blocks, *output_is_stored]), "dout"]
                 source += self._wrapped(f"{program.name}_direction", moved)
-        for name, content in (runtime_sources() | generate(spec).files | {"kernels.c": source}).items():
+        for name, content in (runtime_sources(spec) | generate(spec).files | {"kernels.c": source}).items():
             (folder / name).write_text(content, encoding="utf-8")
         flags = [*FLAGS["c"], "-fvisibility=default", "-Werror", "-shared"]
         subprocess.run([*find_compiler().command, *flags, "kernels.c", "-o", "k.so", "-lm"], cwd=folder, check=True)

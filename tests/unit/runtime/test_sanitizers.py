@@ -74,7 +74,7 @@ TESTED = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) fo
 
 def compiled(scene: Scene, folder: Path, flags: tuple[str, ...]) -> Path:
     """The program of one scene's model."""
-    sources = runtime_sources() | generate(scene.spec).files
+    sources = runtime_sources(scene.spec) | generate(scene.spec).files
     for name, content in sources.items():
         (folder / name).write_text(content, encoding="utf-8")
     shutil.copy(REPLAY, folder)
