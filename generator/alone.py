@@ -19,7 +19,7 @@ from msfp_gen.specification.layout import ModelSpec
 
 from . import Generated
 from .derive import Equations, derive
-from .drivers import part
+from .drivers import LENGTHS, part
 from .emit import function
 from .interface import effects_text, environment, surface_values
 from .lower import lower
@@ -32,6 +32,7 @@ from .schedule import (
     List,
     Over,
     Pass,
+    Per,
     condensed,
     momentum_balances,
     passes_of,
@@ -63,10 +64,10 @@ class _Layout:
     def __init__(self, equations: Equations, lists: Iterable[List]) -> None:
         self.equations, self.lists, self.starts = equations, list(lists), dict[str, int]()
         count, total = equations.spec.layout.surfaces, 0
-        self.lengths = {"": 1, "MSFP_NB": count, "MSFP_NB + 1": count + 1}
+        self.lengths = {Per.STACK: 1, Per.SURFACE: count, Per.BODY: count + 1}
         for one in self.lists:
             self.starts[one.name] = total
-            total += self.lengths[one.length] * len(self.block(one).fields)
+            total += self.lengths[one.per] * len(self.block(one).fields)
         self.total = total
 
     def block(self, one: List) -> Block:
@@ -189,7 +190,7 @@ def equations_alone(spec: ModelSpec, example: Any) -> Generated:
         "effects": effects_text(spec),
         "module": module_name(spec),
         "blocks": list(blocks.values()),
-        "lists": [(one.name, parts.block(one).name, one.length) for one in lists],
+        "lists": [(one.name, parts.block(one).name, LENGTHS[one.per]) for one in lists],
         "functions": [function(kernel) for kernel in kernels],
         "drivers": drivers,
         "plain": _plain,

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from operator import attrgetter
 from typing import Any
 
 from . import two_port as ends
@@ -18,13 +16,16 @@ from .schedule import (
     LISTS,
     VARIABLES,
     Call,
-    Decision,
-    InC,
+    If,
     Kept,
     List,
     Over,
     Pass,
+    Per,
     Schedule,
+    Solve,
+    Values,
+    When,
     calls_of,
     check,
     condensed,
@@ -43,9 +44,67 @@ LOOPS = {
     Over.SURFACES: "for (int j = 0; j < MSFP_NB; ++j)",
     Over.DOWNWARD: "for (int j = MSFP_NB - 1; j >= 0; --j)",
 }
+LENGTHS = {Per.STACK: "", Per.SURFACE: "MSFP_NB", Per.BODY: "MSFP_NB + 1"}
 INDICES = {"base": "0", "top": "MSFP_NB", "slider": "msfp_slider(j)"}
+CONDITIONS = {  # the argument of the driver that it reads, and its C
+    When.RIM_PUSHES: ("w", "w->rim_active[j]"),
+    When.RIM_CLOSED: ("w", "w->rim_gap[j] < 0.0"),
+    When.ON_FACE: ("w", "w->standing[j] == MSFP_ON_FACE"),
+    When.ON_EDGE: ("w", "w->standing[j] == MSFP_ON_EDGE"),
+    When.OFF_CENTRE: ("w", "msfp_body_sp(w->body[j + 1]) != 0.0 || w->body[j + 1][MSFP_BODY_ST] != 0.0"),
+}
+RUNTIME: Mapping[tuple[str, str], tuple[str, tuple[str, ...]]] = {
+    ("foot", "values"): ("msfp_move_foot", ("p", "s->foot_stage", "w")),
+    ("foot", "directions"): ("msfp_foot_columns", ("p", "dp", "s->at", "ds->point", "w", "d")),
+    ("contact", "values"): ("msfp_contacts", ("p", "w", "s->weights", "s->g", "s->jacobians->contact")),
+    ("contact", "tangents"): ("msfp_contact_tangents", ("w", "ds->contact_frame", "ds->contact")),
+    ("contact", "directions"): (
+        "msfp_contact_columns",
+        ("p", "dp", "w", "ds->point", "ds->slopes", "s->weights", "ds->all", "d"),
+    ),
+    ("closed_rim", "values"): ("msfp_gap_of_rim", ("w", "j", "s->closed_rim[j]")),
+    ("closed_rim", "directions"): (
+        "msfp_closed_rim_columns",
+        ("p", "dp", "w", "d", "j", "s->closed_rim[j]", "ds->closed_rim[j]"),
+    ),
+    ("rim", "values"): ("msfp_rim_force", ("p", "w", "j", "s->jacobians->rim[j]")),
+    ("unilateral_inside", "values"): ("msfp_unilateral_force", ("p", "w", "j")),
+}
+"""What the runtime does itself: program and form -> its function and what this is given; of `jacobians` where these are
+wanted."""
+BY_ENDS = {"foot": "if (msfp_top_is_sprung(p)) ", "contact": LOOPS[Over.SURFACES] + " "}
+"""What the runtime solves, of which the derivatives by the motion of the ends are a program: where this runs."""
 Programs = Mapping[str, Program]
-Lines = Callable[[Call, Programs], Iterator[str]]
+
+
+@dataclass(frozen=True)
+class Line:
+    """A statement in C, and the arguments of its driver that it names."""
+
+    text: str
+    names: frozenset[str] = frozenset()
+
+    def inside(self, before: str) -> Line:
+        """The same statement after some text."""
+        return replace(self, text=before + self.text)
+
+
+def _line(text: str, *places: str) -> Line:
+    """A statement that names places in C, each an argument or what it points to: `w`, `w->body[j]`."""
+    return Line(text, frozenset(place.partition("->")[0] for place in places))
+
+
+def _run(function: str, given: Iterable[str]) -> Line:
+    """The call of a function."""
+    places = list(given)
+    return _line(f"{function}({', '.join(map(_or_null, places))})", *places)
+
+
+def _or_null(place: str) -> str:
+    return f"s->jacobians ? {place} : NULL" if place.startswith("s->jacobians->") else place
+
+
+Lines = Callable[[Call, Programs], Iterator[Line]]
 
 
 def scheduled_kernels(equations: Equations) -> tuple[Kernel, ...]:
@@ -84,7 +143,7 @@ class Form:
     """Directional derivatives by one set of directions.
 
     Attributes:
-        name: of the member of `InC` with C of the derivatives; that of `List` is the same with `_in_c`.
+        name: "directions" or "by_ends", as in `Solve`.
         kernels: name of a program -> its derivatives.
         read: the lists whose values these contain.
     """
@@ -161,8 +220,8 @@ def _called(schedule: Schedule) -> dict[str, Call]:
 
 
 def _emitted(schedule: Schedule) -> list[Call]:
-    """The calls that are emitted, without those of C alone."""
-    return [call for call in calls_of(passes_of(schedule)) if not isinstance(call.by, InC)]
+    """The calls that are emitted, without those of the runtime."""
+    return [call for call in calls_of(passes_of(schedule)) if not isinstance(call.by, Solve)]
 
 
 def _lists(schedule: Schedule) -> dict[str, None]:
@@ -204,13 +263,13 @@ def part(name: str, passes: Iterable[Pass], programs: Programs, directional: Map
     added = dict.fromkeys(place for call in calls if call.adds for place in call.writes)
     return {
         "name": name,
-        "added": {form: [getattr(list_of(place), f"{form}_in_c") for place in added] for form in forms},
+        "added": {form: [member(list_of(place), form) for place in added] for form in forms},
         "constant": not any(list_of(place).kept is Kept.WORK for call in calls for place in call.writes),
-        "fails": any(isinstance(call.by, InC) and call.by.fails for call in calls),
+        "fails": any(isinstance(call.by, Solve) and call.by.fails for call in calls),
         "unused": {form: _unused(line for _, many in written for line in many) for form, written in lines.items()},
         "passes": {
             form: [
-                {"over": one.over.value, "loop": LOOPS.get(one.over, ""), "lines": many}
+                {"over": one.over.value, "loop": LOOPS.get(one.over, ""), "lines": [line.text for line in many]}
                 for one, many in written
                 if many
             ]
@@ -221,18 +280,29 @@ def part(name: str, passes: Iterable[Pass], programs: Programs, directional: Map
 
 def _has(calls: Iterable[Call], form: Form) -> bool:
     """Whether a form has the derivatives of calls."""
-    return all(name in form.kernels for call in calls for name in call.programs if not isinstance(call.by, InC))
+    return all(name in form.kernels for call in calls for name in call.programs if not isinstance(call.by, Solve))
 
 
-def _unused(lines: Iterable[str]) -> list[str]:
+def _unused(lines: Iterable[Line]) -> list[str]:
     """The arguments of a driver that its statements do not name."""
-    words = {word for line in lines for word in re.findall(r"\w+", line)}
-    return [name for name in ("p", "dp", "w", "d", "s", "ds") if name not in words]
+    named = {name for line in lines for name in line.names}
+    return [name for name in ("p", "dp", "w", "d", "s", "ds") if name not in named]
+
+
+def member(one: List, form: str) -> str:
+    """C of the blocks of a list, or of their derivatives; empty for parameters where they are constant."""
+    if form == "values":
+        return f"{one.kept.value}->{one.name}"
+    if one.kept is Kept.PARAMETERS:
+        return f"dp->{one.name}" if form == "directions" else ""
+    if form == "tangents":
+        return f"w->d{one.name}" if one.tangents else f"ds->{one.name}"
+    return f"d->{one.name}" if form == "by_ends" or one.directions else f"ds->{one.name}"
 
 
 def _declared(one: List, equations: Equations) -> dict[str, str]:
     block: Block = getattr(equations.blocks, one.kind)
-    return {"name": one.name, "block": block.name, "length": one.length}
+    return {"name": one.name, "block": block.name, "length": LENGTHS[one.per]}
 
 
 def _entries(name: str, quantities: Iterable[str], equations: Equations) -> dict[str, Any]:
@@ -241,125 +311,152 @@ def _entries(name: str, quantities: Iterable[str], equations: Equations) -> dict
     block: Block = getattr(equations.blocks, one.kind)
     index = {field.name: i for i, field in enumerate(block.fields)}
     parts = [part for quantity in quantities for part in block.quantities.get(quantity, ())]
-    at = "[v->index]" if one.length else ""
+    at = "" if one.per is Per.STACK else "[v->index]"
     entries = [index[part] if isinstance(part, str) else -1 for part in parts]
-    return {"values": f"{one.values_in_c}{at}", "tangents": f"{one.tangents_in_c}{at}", "entries": entries}
+    return {**{form: f"{member(one, form)}{at}" for form in ("values", "tangents")}, "entries": entries}
 
 
-def _in_c(member: str, place: str) -> str:
+def _in_c(place: str, form: str) -> str:
+    """C of a place, or of its derivatives."""
     index = index_of(place)
     index = INDICES.get(index, index.replace("-", " - ").replace("+", " + "))
-    return f"{member}[{index}]" if index else member
+    return member(list_of(place), form) + (f"[{index}]" if index else "")
 
 
-def _values(call: Call, programs: Programs) -> Iterator[str]:
+def _all_in_c(places: Iterable[str], form: str) -> list[str]:
+    return [_in_c(place, form) for place in places]
+
+
+def _values(call: Call, programs: Programs) -> Iterator[Line]:
     """Statements that evaluate a call."""
-    if isinstance(call.by, InC) and call.by.fails:
-        yield f"const int status = {call.by.values};"
-        yield "if (status)"
-        yield "    return status;"
-    elif isinstance(call.by, Decision) and call.by.itself:
-        writes = [_in_c(list_of(place).values_in_c, place) for place in call.writes]
-        many = ((name, list(_evaluated(call, programs[name]))) for name in call.programs)
-        yield from _chosen(call, writes, many)
-    elif isinstance(call.by, Decision | InC):
-        if call.by.values:
-            yield f"{call.by.values};"
-    else:
+    if call.by is None:
         yield from _evaluated(call, programs[call.program])
+    elif isinstance(call.by, Solve) or call.by.values in (Values.RUNTIME, Values.RUNTIME_WITH_SLOPES):
+        function, given = RUNTIME[call.program, "values"]
+        if isinstance(call.by, If) and call.by.values is Values.RUNTIME:
+            given = tuple("NULL" if place.startswith("s->jacobians") else place for place in given)
+        solved = _run(function, given)
+        if isinstance(call.by, Solve) and call.by.fails:
+            yield Line(f"const int status = {solved.text};", solved.names)
+            yield Line("if (status)")
+            yield Line("    return status;")
+        else:
+            yield Line(f"{solved.text};", solved.names)
+    elif call.by.values is Values.HERE:
+        many = ((name, list(_evaluated(call, programs[name]))) for name in call.programs)
+        yield from _chosen(call, _all_in_c(call.writes, "values"), many)
 
 
-def _evaluated(call: Call, program: Program) -> Iterator[str]:
-    reads = [_in_c(list_of(place).values_in_c, place) for place in call.reads]
-    writes = [_in_c(list_of(place).values_in_c, place) for place in call.writes]
+def _evaluated(call: Call, program: Program) -> Iterator[Line]:
+    reads, writes = _all_in_c(call.reads, "values"), _all_in_c(call.writes, "values")
     yield from _written(call, f"msfp_{program.name}", reads, writes, _size(program))
 
 
-def _written(call: Call, function: str, arguments: list[str], writes: list[str], size: str) -> Iterator[str]:
+def _written(call: Call, function: str, arguments: list[str], writes: list[str], size: str) -> Iterator[Line]:
     """Statements that call a function and put its result into one block, into several, or add it to one."""
     if len(writes) == 1 and not call.adds:
-        yield f"{function}({', '.join([*arguments, *writes])});"
+        yield _statement(function, [*arguments, *writes])
         return
-    yield "{"
-    yield f"    double out[{size}];"
-    yield f"    {function}({', '.join([*arguments, 'out'])});"
+    yield Line("{")
+    yield Line(f"    double out[{size}];")
+    yield _statement(function, [*arguments, "out"]).inside("    ")
     if call.adds:
-        yield f"    for (int i = 0; i < {size}; ++i)"
-        yield f"        {writes[0]}[i] += out[i];"
+        yield Line(f"    for (int i = 0; i < {size}; ++i)")
+        yield _line(f"        {writes[0]}[i] += out[i];", writes[0])
     else:
         yield from _copies(writes)
-    yield "}"
+    yield Line("}")
 
 
-def _tangents(call: Call, programs: Programs) -> Iterator[str]:
+def _statement(function: str, given: Iterable[str]) -> Line:
+    called = _run(function, given)
+    return replace(called, text=f"{called.text};")
+
+
+def _tangents(call: Call, programs: Programs) -> Iterator[Line]:
     """Statements that differentiate a call by the variables of a step. A tangent stores the values once more."""
-    if isinstance(call.by, InC):
-        if call.by.tangents:
-            yield f"{call.by.tangents};"
+    if isinstance(call.by, Solve):
+        if "tangents" in call.by.forms:
+            yield _statement(*RUNTIME[call.program, "tangents"])
         return
     if not any(programs[name].tangents for name in call.programs):
         return
-    writes = [_in_c(list_of(place).tangents_in_c, place) for place in call.writes]
+    writes = _all_in_c(call.writes, "tangents")
     yield from _chosen(call, writes, ((name, list(_tangent(call, programs[name], writes))) for name in call.programs))
 
 
-def _tangent(call: Call, program: Program, writes: list[str]) -> Iterator[str]:
-    reads = [_in_c(list_of(place).values_in_c, place) for place in call.reads]
-    places = [place for place, use in zip(call.reads, program.inputs, strict=True) if use.moving]
-    moving = [_in_c(list_of(place).tangents_in_c, place) for place in places]
-    values = [_in_c(list_of(place).values_in_c, place) for place in call.writes]
+def _tangent(call: Call, program: Program, writes: list[str]) -> Iterator[Line]:
+    reads, values = _all_in_c(call.reads, "values"), _all_in_c(call.writes, "values")
+    moving = _moving(call, program, "tangents")
     name = f"msfp_{tangent_of(program).name}_tangent"
     if len(writes) == 1:
-        yield f"{name}({', '.join([*reads, *values, *moving, *writes])});"
+        yield _statement(name, [*reads, *values, *moving, *writes])
         return
-    yield "{"
-    yield f"    double values[{_size(program)}], out[{_size(program)} * {COLUMNS}];"
-    yield f"    {name}({', '.join([*reads, 'values', *moving, 'out'])});"
+    yield Line("{")
+    yield Line(f"    double values[{_size(program)}], out[{_size(program)} * {COLUMNS}];")
+    yield _statement(name, [*reads, "values", *moving, "out"]).inside("    ")
     yield from _copies(writes)
-    yield "}"
+    yield Line("}")
 
 
-def _directions(call: Call, programs: Programs, form: Form) -> Iterator[str]:
+def _moving(call: Call, program: Program, form: str) -> list[str]:
+    """C of the derivatives that a program reads."""
+    return [_in_c(place, form) for place, use in zip(call.reads, program.inputs, strict=False) if use.moving]
+
+
+def _directions(call: Call, programs: Programs, form: Form) -> Iterator[Line]:
     """Statements that differentiate a call along directions, with its values where the work area does not hold them."""
-    if isinstance(call.by, InC):
-        yield f"{getattr(call.by, form.name)};"
+    if isinstance(call.by, Solve):
+        yield from _of_solved(call, form)
         return
-    member = attrgetter(f"{form.name}_in_c")
-    writes = [_in_c(member(list_of(place)), place) for place in call.writes]
+    writes = _all_in_c(call.writes, form.name)
     names = {place.partition("[")[0] for place in call.writes}
     values = any(LISTS[name].kept is Kept.HERE for name in names & form.read)
     many = ((name, list(_direction(call, programs[name], writes, values, form))) for name in call.programs)
     yield from _chosen(call, writes, many)
 
 
-def _direction(call: Call, program: Program, writes: list[str], with_values: bool, form: Form) -> Iterator[str]:
+def _of_solved(call: Call, form: Form) -> Iterator[Line]:
+    """The same of what the runtime solves: it differentiates this itself, or the derivatives are a program."""
+    if form.name == "directions":
+        yield _statement(*RUNTIME[call.program, form.name])
+    elif call.program in form.kernels:
+        derivatives = form.kernels[call.program].program
+        # The friction force of the surfaces, for which the runtime solves, is not in a list.
+        reads = ["s->g[j]" if place == "shear[j]" else _in_c(place, "values") for place in call.reads]
+        given = [*reads, *_all_in_c(call.writes, "values"), *_moving(call, derivatives, form.name)]
+        called = _statement(f"msfp_{derivatives.name}", [*given, *_all_in_c(call.writes, form.name)])
+        when = _line(BY_ENDS[call.program], "p") if call.program == "foot" else Line(BY_ENDS[call.program])
+        yield Line(when.text + called.text, when.names | called.names)
+
+
+def _direction(call: Call, program: Program, writes: list[str], with_values: bool, form: Form) -> Iterator[Line]:
     if with_values:
         yield from _evaluated(call, program)
-    derivatives, member = form.kernels[program.name].program, attrgetter(f"{form.name}_in_c")
-    reads = [_in_c(list_of(place).values_in_c, place) for place in call.reads]
-    values = [_in_c(list_of(place).values_in_c, place) for place in call.writes] if _at_hand(call) else []
-    places = [place for place, use in zip(call.reads, derivatives.inputs, strict=False) if use.moving]
-    moving = [_in_c(member(list_of(place)), place) for place in places]
+    derivatives = form.kernels[program.name].program
+    values = _all_in_c(call.writes, "values") if _at_hand(call) else []
+    given = [*_all_in_c(call.reads, "values"), *values, *_moving(call, derivatives, form.name)]
     size = f"{_size(program)} * {derivatives.columns}"
-    yield from _written(call, f"msfp_{derivatives.name}", [*reads, *values, *moving], writes, size)
+    yield from _written(call, f"msfp_{derivatives.name}", given, writes, size)
 
 
-def _chosen(call: Call, writes: list[str], programs: Iterable[tuple[str, list[str]]]) -> Iterator[str]:
+def _chosen(call: Call, writes: list[str], programs: Iterable[tuple[str, list[Line]]]) -> Iterator[Line]:
     """Statements of the program that acts; where none does, the derivatives are zero."""
-    if not isinstance(call.by, Decision):
+    if not isinstance(call.by, If):
         for _, statements in programs:
             yield from statements
         return
     start = ""
     for name, statements in programs:
-        yield f"{start}if ({call.by.acts[name]}) {{"
-        yield from (f"    {statement}" for statement in statements)
+        argument, condition = CONDITIONS[call.by.acts[name]]
+        yield _line(f"{start}if ({condition}) {{", argument)
+        yield from (statement.inside("    ") for statement in statements)
         start = "} else "
     if call.adds:
-        yield "}"
+        yield Line("}")
         return
-    yield "} else"
-    yield f"    memset({writes[0]}, 0, sizeof {writes[0]});"
+    yield Line("} else")
+    yield _line(f"    memset({writes[0]}, 0, sizeof {writes[0]});", writes[0])
 
 
 def _size(program: Program) -> str:
@@ -367,9 +464,9 @@ def _size(program: Program) -> str:
     return f"MSFP_{program.output.block.name.upper()}_SIZE"
 
 
-def _copies(writes: Iterable[str]) -> Iterator[str]:
+def _copies(writes: Iterable[str]) -> Iterator[Line]:
     """Statements that copy `out` to several places, one after the other."""
     start = "out"
     for write in writes:
-        yield f"    memcpy({write}, {start}, sizeof {write});"
+        yield _line(f"    memcpy({write}, {start}, sizeof {write});", write)
         start += f" + sizeof {write} / sizeof *out"

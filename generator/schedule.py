@@ -1,9 +1,9 @@
 """Schedules: which program runs over which bodies and surfaces, from which blocks to which.
 
 A program (`derive.py`) describes one body or one surface. A schedule states, as data, how the programs of a stack
-follow each other in one evaluation. The C that calls them is emitted from it in up to four forms (`drivers.py`): the
-values; derivatives with respect to the variables of a step, by the tangents of the programs; derivatives by the motion
-of the ends of a two-port; and, in models with gradients, derivatives with respect to parameters.
+follow each other in one evaluation. `drivers.py` prints the C that calls them in up to four forms: the values;
+derivatives with respect to the variables of a step, by the tangents of the programs; derivatives by the motion of the
+ends of a two-port; and, in models with gradients, derivatives with respect to parameters.
 
 A place is a block in a list of blocks: `body[k-1]` is the block of the body below body k, `rim[j]` that of surface j,
 which lies between bodies j and j+1. `base` and `top` are the indices of the lowest and of the highest body.
@@ -36,38 +36,49 @@ class Over(Enum):
     TOP = "top"
 
 
+class When(Enum):
+    """A condition of the state of an evaluation under which a program acts."""
+
+    RIM_PUSHES = "the rim of surface j pushes"
+    RIM_CLOSED = "surface j is beyond its capacity"
+    ON_FACE = "the slider of surface j stands on its face"
+    ON_EDGE = "the slider of surface j stands on its edge"
+    OFF_CENTRE = "surface j has slid"
+    """At the centre the sliding displacement has a kink, where its derivative counts as zero."""
+
+
+class Values(Enum):
+    """Where the program of an `If` is evaluated."""
+
+    HERE = "here, where it acts; what it writes is zero elsewhere"
+    LATER = "where the next call needs it; here its derivatives alone"
+    RUNTIME = "in the runtime, which sets to zero what it writes where it does not act"
+    RUNTIME_WITH_SLOPES = "in the runtime, which also gives the fast tangent what it needs"
+
+
 @dataclass(frozen=True)
-class Decision:
-    """C that decides whether a program acts, or which of several does.
+class If:
+    """Whether a program acts, or which of several does. Where none does, the derivatives are zero.
 
     Attributes:
-        values: statement that evaluates it, and sets what it writes to zero where it does not act. Empty: the program
-            that the next decision needs is evaluated there, and only its derivatives are formed here.
-        acts: program -> the condition in C under which it acts. Where none does, the derivatives are zero.
-        itself: whether the program is evaluated where it acts, and what it writes is zero elsewhere, without `values`.
+        acts: program -> the condition under which it acts.
+        values: where it is evaluated.
     """
 
-    values: str
-    acts: Mapping[str, str]
-    itself: bool = False
+    acts: Mapping[str, When]
+    values: Values = Values.LATER
 
 
 @dataclass(frozen=True)
-class InC:
-    """C that evaluates and differentiates a program itself, because it solves for what the program needs.
+class Solve:
+    """A program that the runtime evaluates and differentiates itself, because it solves for what the program needs.
 
     Attributes:
-        values: an expression, or with `fails` one that returns a status, at which the evaluation ends.
-        tangents: derivatives by the variables of a step; empty where nothing that moves depends on it.
-        directions: derivatives by parameters.
-        by_ends: derivatives by the motion of the ends of a two-port; empty where nothing of it needs them.
-        fails: whether `values` returns a status.
+        forms: the forms of derivatives (`drivers.py`) that there are: "tangents", "directions", "by_ends".
+        fails: whether it may find no solution, with a status at which the evaluation ends.
     """
 
-    values: str
-    tangents: str
-    directions: str
-    by_ends: str = ""
+    forms: frozenset[str]
     fails: bool = False
 
 
@@ -81,15 +92,15 @@ class Call:
     program: str
     reads: tuple[str, ...]
     writes: tuple[str, ...]
-    by: Decision | InC | None = None
-    """A decision in C, or C in place of the program; None: the program is called, and so is its tangent."""
+    by: If | Solve | None = None
+    """Whether it acts, or that the runtime solves it; None: the program is called, and so is its tangent."""
     adds: bool = False
     """Whether what it writes is added to a block, which is zero at the start of the part."""
 
     @property
     def programs(self) -> tuple[str, ...]:
-        """The programs of which one acts: with a decision those of its conditions, otherwise the one of the call."""
-        return tuple(self.by.acts) if isinstance(self.by, Decision) else (self.program,)
+        """The programs of which one acts: with conditions those that have one, otherwise the one of the call."""
+        return tuple(self.by.acts) if isinstance(self.by, If) else (self.program,)
 
 
 @dataclass(frozen=True)
@@ -108,11 +119,19 @@ Place = tuple[str, int]
 
 
 class Kept(Enum):
-    """The record in which C keeps a list, which decides where its derivatives are."""
+    """The record in which a list is kept, which decides where its derivatives are."""
 
     PARAMETERS = "p"
     WORK = "w"
     HERE = "s"
+
+
+class Per(Enum):
+    """Of what a list has one block each."""
+
+    STACK = "the stack"
+    SURFACE = "a surface"
+    BODY = "a body"
 
 
 @dataclass(frozen=True)
@@ -121,9 +140,9 @@ class List:
 
     Attributes:
         kind: name of the block in `Blocks`.
-        name: name in C.
+        name: name in the record that keeps it.
         kept: the parameters, the work area of an evaluation, or the blocks of the schedules alone.
-        length: C of the number of blocks; empty for a single one.
+        per: of what it has one block each.
         tangents: whether the work area keeps derivatives by the variables of a step, which the steppers read.
         directions: whether the work area keeps derivatives by parameters, likewise.
     """
@@ -131,76 +150,51 @@ class List:
     kind: str
     name: str
     kept: Kept = Kept.HERE
-    length: str = ""
+    per: Per = Per.STACK
     tangents: bool = False
     directions: bool = False
 
-    @property
-    def values_in_c(self) -> str:
-        """C of the blocks."""
-        return f"{self.kept.value}->{self.name}"
 
-    @property
-    def tangents_in_c(self) -> str:
-        """C of their derivatives by the variables of a step; empty for parameters, which are constant there."""
-        if self.kept is Kept.PARAMETERS:
-            return ""
-        return f"w->d{self.name}" if self.tangents else f"ds->{self.name}"
-
-    @property
-    def directions_in_c(self) -> str:
-        """C of their derivatives by parameters."""
-        if self.kept is Kept.PARAMETERS:
-            return f"dp->{self.name}"
-        return f"d->{self.name}" if self.directions else f"ds->{self.name}"
-
-    @property
-    def by_ends_in_c(self) -> str:
-        """C of their derivatives by the motion of the ends of a two-port, which are all in one record."""
-        return "" if self.kept is Kept.PARAMETERS else f"d->{self.name}"
-
-
-SURFACES, BODIES = "MSFP_NB", "MSFP_NB + 1"
 LISTS: Mapping[str, List] = {
-    "body_parameters": List("body_parameters", "body", Kept.PARAMETERS, BODIES),
-    "surface_parameters": List("surface_parameters", "surface", Kept.PARAMETERS, SURFACES),
+    "body_parameters": List("body_parameters", "body", Kept.PARAMETERS, Per.BODY),
+    "surface_parameters": List("surface_parameters", "surface", Kept.PARAMETERS, Per.SURFACE),
     "top_parameters": List("top_parameters", "top", Kept.PARAMETERS),
-    "coefficient": List("coefficient", "coefficient", Kept.WORK, SURFACES),
+    "coefficient": List("coefficient", "coefficient", Kept.WORK, Per.SURFACE),
     "foot_stage": List("foot_stage", "foot_stage"),
     "upright": List("upright", "upright"),
     "foot": List("foot", "foot", Kept.WORK, directions=True),
     "frame": List("body", "frame"),
-    "x": List("coordinates", "x", Kept.WORK, BODIES, tangents=True, directions=True),
-    "body": List("body", "body", Kept.WORK, BODIES, tangents=True, directions=True),
+    "x": List("coordinates", "x", Kept.WORK, Per.BODY, tangents=True, directions=True),
+    "body": List("body", "body", Kept.WORK, Per.BODY, tangents=True, directions=True),
     "load_force": List("force", "load_force"),
     "load_moment": List("moment", "load_moment"),
-    "force": List("force", "force", Kept.WORK, BODIES, tangents=True, directions=True),
-    "moment": List("moment", "moment", Kept.WORK, BODIES, tangents=True, directions=True),
-    "unknowns": List("unknowns", "unknowns", length=SURFACES),
-    "friction": List("friction", "friction", length=SURFACES),
-    "rim_coordinates": List("rim_coordinates", "rim_coordinates", length=SURFACES),
-    "rim": List("rim", "rim", Kept.WORK, SURFACES, directions=True),
-    "relative": List("relative", "relative", length=SURFACES),
-    "report_contact": List("report_contact", "report_contact", length=SURFACES),
-    "linear": List("linear", "linear", length=BODIES),
-    "angular": List("angular", "angular", length=BODIES),
-    "balances": List("balances", "balances", length=BODIES),
-    "contact_frame": List("contact_frame", "contact_frame", Kept.WORK, SURFACES, directions=True),
-    "before": List("before", "before", length=SURFACES),
-    "stage": List("stage", "stage", Kept.WORK, SURFACES, directions=True),
-    "shear": List("shear", "shear", length=SURFACES),
-    "contact": List("contact", "contact", Kept.WORK, SURFACES, directions=True),
-    "local_moment": List("moment", "local_moment", length=SURFACES),
-    "unilateral": List("unilateral", "unilateral", Kept.WORK, SURFACES, directions=True),
-    "rim_wrench": List("rim_wrench", "rim_wrench", Kept.WORK, SURFACES),
-    "carried": List("force", "carried", length=BODIES),
-    "excess": List("linear", "excess", length=SURFACES),
-    "joint_moment": List("moment", "joint_moment", length=SURFACES),
-    "below": List("moment", "below", Kept.WORK, BODIES),
+    "force": List("force", "force", Kept.WORK, Per.BODY, tangents=True, directions=True),
+    "moment": List("moment", "moment", Kept.WORK, Per.BODY, tangents=True, directions=True),
+    "unknowns": List("unknowns", "unknowns", per=Per.SURFACE),
+    "friction": List("friction", "friction", per=Per.SURFACE),
+    "rim_coordinates": List("rim_coordinates", "rim_coordinates", per=Per.SURFACE),
+    "rim": List("rim", "rim", Kept.WORK, Per.SURFACE, directions=True),
+    "relative": List("relative", "relative", per=Per.SURFACE),
+    "report_contact": List("report_contact", "report_contact", per=Per.SURFACE),
+    "linear": List("linear", "linear", per=Per.BODY),
+    "angular": List("angular", "angular", per=Per.BODY),
+    "balances": List("balances", "balances", per=Per.BODY),
+    "contact_frame": List("contact_frame", "contact_frame", Kept.WORK, Per.SURFACE, directions=True),
+    "before": List("before", "before", per=Per.SURFACE),
+    "stage": List("stage", "stage", Kept.WORK, Per.SURFACE, directions=True),
+    "shear": List("shear", "shear", per=Per.SURFACE),
+    "contact": List("contact", "contact", Kept.WORK, Per.SURFACE, directions=True),
+    "local_moment": List("moment", "local_moment", per=Per.SURFACE),
+    "unilateral": List("unilateral", "unilateral", Kept.WORK, Per.SURFACE, directions=True),
+    "rim_wrench": List("rim_wrench", "rim_wrench", Kept.WORK, Per.SURFACE),
+    "carried": List("force", "carried", per=Per.BODY),
+    "excess": List("linear", "excess", per=Per.SURFACE),
+    "joint_moment": List("moment", "joint_moment", per=Per.SURFACE),
+    "below": List("moment", "below", Kept.WORK, Per.BODY),
     "base_motion": List("base_motion", "base_motion"),
     "energy": List("energy", "energy"),
-    "closed_rim": List("closed_rim", "closed_rim", length=SURFACES),
-    "lock": List("lock", "lock", Kept.WORK, SURFACES, directions=True),
+    "closed_rim": List("closed_rim", "closed_rim", per=Per.SURFACE),
+    "lock": List("lock", "lock", Kept.WORK, Per.SURFACE, directions=True),
     "restraint": List("restraint", "restraint"),
     "rim_energy": List("rim_energy", "rim_energy"),
     "unilateral_energy": List("unilateral_energy", "unilateral_energy"),
@@ -214,7 +208,7 @@ LISTS: Mapping[str, List] = {
     "held": List("moment", "held"),
     "lower": List("end_wrench", "lower"),
     "upper": List("end_wrench", "upper"),
-    "gap": List("gap", "gap", length=SURFACES),
+    "gap": List("gap", "gap", per=Per.SURFACE),
 }
 """All lists of blocks."""
 
@@ -250,10 +244,6 @@ def unknowns(spec: ModelSpec) -> list[tuple[str, int, int]]:
     ]
 
 
-RIM = "w->rim_active[j]"
-"""Whether a rim pushes."""
-
-
 def _kinematics() -> Schedule:
     """The bodies from the base up."""
     return {
@@ -266,7 +256,6 @@ def _top(effects: Effects) -> Pass:
     """Force and moment above the top plate, and the foot of a mass on a vertical spring."""
     support = ("upright",) if effects.top_rotation else ()
     reads = ("top_parameters", "foot_stage", "body[top]", "x[top]", "load_force", "load_moment", *support)
-    foot = "p->top, w->body[MSFP_NB], s->foot_stage, w->foot, d->body[MSFP_NB], d->foot_stage, d->foot"
     return Pass(
         Over.TOP,
         (
@@ -275,12 +264,7 @@ def _top(effects: Effects) -> Pass:
                 "foot",
                 ("top_parameters", "body[top]", "foot_stage"),
                 ("foot",),
-                InC(
-                    "msfp_move_foot(p, s->foot_stage, w)",
-                    "",
-                    "msfp_foot_columns(p, dp, s->at, ds->point, w, d)",
-                    f"if (msfp_top_is_sprung(p)) msfp_foot_by_ends({foot})",
-                ),
+                Solve(frozenset({"directions", "by_ends"})),
             ),
         ),
     )
@@ -290,9 +274,8 @@ def _rim(effects: Effects) -> tuple[Call, ...]:
     """The rim of surface j."""
     if not effects.rims:
         return ()
-    coordinates = Decision("", {"rim_coordinates": RIM})
-    slopes = "NULL" if effects.uplift else "s->jacobians ? s->jacobians->rim[j] : NULL"
-    rim = Decision(f"msfp_rim_force(p, w, j, {slopes})", {"rim": RIM})
+    coordinates = If({"rim_coordinates": When.RIM_PUSHES})
+    rim = If({"rim": When.RIM_PUSHES}, Values.RUNTIME if effects.uplift else Values.RUNTIME_WITH_SLOPES)
     return (
         Call("rim_coordinates", ("body[j]", "x[j+1]"), ("rim_coordinates[j]",), coordinates),
         Call("rim", ("surface_parameters[j]", "rim_coordinates[j]"), ("rim[j]",), rim),
@@ -366,10 +349,7 @@ def _split(rims: bool) -> Call:
 def _unilateral(rims: bool) -> tuple[Call, ...]:
     """Force of surface j with uplift, of its unilateral contact and its rim."""
     slider, wrench = "body[slider]", ("rim_wrench[j]",) if rims else ()
-    contact = Decision(
-        "msfp_unilateral_force(p, w, j)",
-        {"unilateral_edge": "w->standing[j] == MSFP_ON_EDGE", "unilateral_inside": "w->standing[j] == MSFP_ON_FACE"},
-    )
+    contact = If({"unilateral_edge": When.ON_EDGE, "unilateral_inside": When.ON_FACE}, Values.RUNTIME)
     on_rim = Call("rim_to_world", ("body[j]", "x[j+1]", "rim[j]"), ("rim_wrench[j]",))
     return (
         Call("unilateral_inside", ("surface_parameters[j]", slider, "x[j+1]"), ("unilateral[j]",), contact),
@@ -401,16 +381,8 @@ def condensed(effects: Effects) -> Schedule:
     """
     rim, uplift = ("rim[j]",) if effects.rims else (), effects.uplift
     law = ("coefficient[j]",) if effects.law is not None else ()
-    values = "p->surface[j], w->stage[j], w->contact_frame[j], s->g[j]" + (", w->coefficient[j]" if law else "")
-    moved = "w->contact[j], d->stage[j], d->contact_frame[j], d->contact[j]"
     summed = Call("interface_force", ("body_parameters[j+1]", "body[j+1]", "force[j+1]"), ("force[j]",))
-    contact = InC(
-        "msfp_contacts(p, w, s->weights, s->g, s->jacobians ? s->jacobians->contact : NULL)",
-        "msfp_contact_tangents(w, ds->contact_frame, ds->contact)",
-        "msfp_contact_columns(p, dp, w, ds->point, ds->slopes, s->weights, ds->all, d)",
-        f"for (int j = 0; j < MSFP_NB; ++j) msfp_contact_by_ends({values}, {moved})",
-        fails=True,
-    )
+    contact = Solve(frozenset({"tangents", "directions", "by_ends"}), fails=True)
     moments = (
         Call("surface_moment", ("contact[j]", *rim), ("local_moment[j]",)),
         Call("moment_to_world", ("body[j]", "local_moment[j]"), ("joint_moment[j]" if uplift else "moment[j]",)),
@@ -464,17 +436,13 @@ def energies(effects: Effects) -> Schedule:
             "closed_rim",
             ("rim[j]",),
             ("closed_rim[j]",),
-            InC(
-                "msfp_gap_of_rim(w, j, s->closed_rim[j])",
-                "",
-                "msfp_closed_rim_columns(p, dp, w, d, j, s->closed_rim[j], ds->closed_rim[j])",
-            ),
+            Solve(frozenset({"directions"})),
         ),
         Call(
             "rim_energy",
             ("surface_parameters[j]", "closed_rim[j]"),
             ("rim_energy",),
-            Decision("", {"rim_energy": "w->rim_gap[j] < 0.0"}, itself=True),
+            If({"rim_energy": When.RIM_CLOSED}, Values.HERE),
             adds=True,
         ),
     )
@@ -516,9 +484,7 @@ def two_port(effects: Effects) -> Schedule:
     """The ends of a two-port: load and support of the top plate; after an evaluation the wrenches of the ends."""
     moment = "below[base]" if effects.uplift else "moment[base]"
     support = (Call("upright", ("support",), ("upright",)),) if effects.top_rotation else ()
-    # At the centre the sliding displacement has a kink, where its derivative counts as zero.
-    tilted = "msfp_body_sp(w->body[j + 1]) != 0.0 || w->body[j + 1][MSFP_BODY_ST] != 0.0"
-    sliding = Call("gap", ("surface_parameters[j]", "body[j+1]"), ("gap[j]",), Decision("", {"gap": tilted}))
+    sliding = Call("gap", ("surface_parameters[j]", "body[j+1]"), ("gap[j]",), If({"gap": When.OFF_CENTRE}))
     return {
         "interface": (
             Pass(Over.TOP, (Call("interface_load", ("top_parameters", "far_end"), ("load_force",)), *support)),
@@ -603,8 +569,8 @@ def check(
     """Raise AssertionError where a place does not fit its program, or a derivative would be lost or is not there.
 
     Every derivative that a call reads must have been written by an earlier one, or be given: (list, field), those of
-    `VARIABLES` where it is None. A call must not take for constant what has derivatives. What C differentiates itself,
-    as the member `form` of `InC` says, is checked for its places only.
+    `VARIABLES` where it is None. A call must not take for constant what has derivatives. Of what the runtime
+    differentiates itself in this form only the places are checked.
 
     Returns:
         The lists that have derivatives.
@@ -617,8 +583,8 @@ def check(
     for call, program in every:
         assert program.output is not None
         assert len(call.reads) == len(program.inputs), call
-        assert not isinstance(call.by, InC) or getattr(call.by, form) or not program.tangents, call
-        needed = set() if isinstance(call.by, InC) else _differentiated(program)
+        assert not isinstance(call.by, Solve) or form in call.by.forms or not program.tangents, call
+        needed = set() if isinstance(call.by, Solve) else _differentiated(program)
         for place, use in zip(call.reads, program.inputs, strict=True):
             assert getattr(blocks, list_of(place).kind) == use.block, (call, place)
             known = {field for name, field in moving if name == place.partition("[")[0]}

@@ -19,7 +19,7 @@ from .functions import Select
 from .latex import SYMBOLS, field_names
 from .lower import needed_statements
 from .program import Block, Program, Statement
-from .schedule import LISTS, InC, Place, momentum_balances, passes_of, unrolled
+from .schedule import LISTS, Place, Solve, momentum_balances, passes_of, unrolled
 
 Record = Mapping[str, sp.Expr]
 """Stored field of a block -> its value."""
@@ -174,7 +174,7 @@ def assemble(spec: ModelSpec) -> Assembled:
     _parameters(out, work)
     _given(out, equations)
     for call, reads, writes in unrolled(passes_of(momentum_balances(spec.effects)), spec.layout.signs):
-        if isinstance(call.by, InC):  # the foot of a vertical spring, on which nothing here depends
+        if isinstance(call.by, Solve):  # the foot of a vertical spring, on which nothing here depends
             continue
         result = work.call(call.program, [out.lists[place] for place in reads], writes[0])
         if call.program == "rim":

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 from msfp_gen import Effects, Layout
-from msfp_gen.generator import lower, two_port
+from msfp_gen.generator import drivers, lower, two_port
+from msfp_gen.generator import schedule as schedules
 from msfp_gen.generator.derive import Equations, derive
 from msfp_gen.generator.schedule import (
     Call,
-    InC,
     Pass,
     Schedule,
+    Solve,
     calls_of,
     check,
     condensed,
@@ -102,8 +105,8 @@ def test_every_list_is_written_before_it_is_read(
     known |= {"foot_stage", "upright", "coefficient", "unknowns", "friction", "before"}
     for call in calls_of(passes_of(schedule(Effects(**effects)))):  # type: ignore[arg-type]
         reads = {place.partition("[")[0] for place in call.reads}
-        if isinstance(call.by, InC):
-            reads -= {"shear"}  # C fills it where it solves for friction
+        if isinstance(call.by, Solve):
+            reads -= {"shear"}  # the runtime fills it where it solves for friction
         assert reads <= known, call
         known |= {place.partition("[")[0] for place in call.writes}
 
@@ -112,6 +115,28 @@ def test_every_list_is_written_before_it_is_read(
 def test_unknowns_are_as_many_as_balances(dimension: str, count: int) -> None:
     found = unknowns(equations_of(dimension=dimension).spec)
     assert len(found) == len(set(found)) == count
+
+
+def test_the_schedule_has_no_text_in_c() -> None:
+    """Nodes alone: `drivers.py` knows how each is written."""
+    written = inspect.getsource(schedules)
+    assert not [
+        word
+        for word in ("msfp_", "w->", "s->", "p->", "d->", "[j];", "NULL")
+        if word in written.replace("msfp_gen", "")
+    ]
+
+
+def test_arguments_that_a_driver_does_not_name_are_marked() -> None:
+    """Found from the statements, and the same as a search of their text finds."""
+    equations = equations_of(top_rotation=True)
+    programs = {program.name: program for program in equations.programs}
+    for name, passes in {**momentum_balances(equations.spec.effects), **condensed(equations.spec.effects)}.items():
+        printed = drivers.part(name, passes, programs, {})
+        for form in ("values", "tangents"):
+            text = " ".join(line for one in printed["passes"][form] for line in one["lines"])
+            named = {*re.findall(r"\w+", text)}
+            assert printed["unused"][form] == [a for a in ("p", "dp", "w", "d", "s", "ds") if a not in named], name
 
 
 def test_names_kept_by_hand_are_those_of_blocks():
