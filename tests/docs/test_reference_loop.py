@@ -50,6 +50,7 @@ def test_a_record_is_that_of_simulate(capsys):
     assert difference(scene, 5.0, 1.5e-3, capsys) < 1e-3
 
 
+@pytest.mark.slow
 def test_both_integrations_tend_to_one_solution():
     """The midpoint rule with its order two, against Dormand and Prince; soft friction, with which that is quick."""
     bearing, motion = presets.bearing("single-articulated-fp"), Motion.harmonic(amplitude=0.05, frequency=1.0)

@@ -95,6 +95,7 @@ def build(folder: Path, *options: str) -> None:
     assert not run.stderr
 
 
+@pytest.mark.slow
 @needs_sphinx
 def test_site_is_built_without_a_warning(tmp_path: Path) -> None:
     build(tmp_path / "site", "--no-gallery")

@@ -86,6 +86,7 @@ def test_reversal_right_after_the_knee(after: float) -> None:
 # ---- yield displacement and size -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("yield_displacement", thinned([1e-4, 1e-3, 1e-2], lambda d_y: d_y == 1e-3))
 def test_soft_yield_follows_the_reference(yield_displacement: float) -> None:
     assert off_the_reference(triple(yield_displacement=yield_displacement), rows=30) < 1e-3

@@ -52,6 +52,7 @@ def test_a_kilohertz() -> None:
     assert np.abs(tight - explicit).max() < 5e-3 * np.abs(explicit).max()
 
 
+@pytest.mark.slow
 def test_six_hundred_seconds_of_cycles_do_not_drift() -> None:
     """Three hundred cycles: the last thirty write the loops of the first to 0.1 % on average, each of them to 1 %.
 
@@ -68,6 +69,7 @@ def test_six_hundred_seconds_of_cycles_do_not_drift() -> None:
     assert run.summary["energy"]["closure_error"] < 1e-3
 
 
+@pytest.mark.slow
 def test_six_hundred_seconds_of_a_frictionless_swing() -> None:
     """Nothing damps it but the method: amplitude and phase after 400 periods, against elliptic functions."""
     bearing = a_pendulum()

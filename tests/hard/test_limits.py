@@ -127,6 +127,7 @@ def test_run_from_a_state_without_an_acceleration_is_named(moment: float, method
 # ---- load ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", thinned([1.0, 1e3, 1e5, 1e7], lambda load: load == 1e7))
 def test_any_load_follows_the_reference(load: float) -> None:
     """From less than the weight of its own plates (20 N) to 1000 t. Light ones ring at some hertz: push slowly."""
@@ -186,6 +187,7 @@ def test_a_load_that_passes_through_zero_is_named_at_the_moment_it_does() -> Non
 # ---- mass ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mass", thinned([1e-6, 1e-3, 1.0, 10.0], lambda mass: mass == 1e-6))
 def test_any_slider_mass_follows_the_reference(mass: float) -> None:
     """Stuck modes from 300 Hz to a megahertz; the work does not grow with them."""

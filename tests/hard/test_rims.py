@@ -105,6 +105,7 @@ def test_start_inside_a_rim_is_pushed_out_at_once(stiffness: float) -> None:
     assert run.events[0].kind == "rim_release"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", thinned(STIFFNESSES, lambda stiffness: stiffness in STIFFNESSES[::5]))
 def test_slow_push_into_every_rim_follows_the_reference(stiffness: float) -> None:
     """Out and back over the rims of a triple pendulum, at half a millimetre a second: ten times faster, a hard rim

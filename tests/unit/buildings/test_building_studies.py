@@ -116,6 +116,7 @@ def test_a_batch_gives_the_results_of_simulate(path: Path):
     assert np.array_equal(results[1].wrench, alone(path.parent, 0.06).wrench)
 
 
+@pytest.mark.slow
 def test_a_sweep_of_the_command_line(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     table, folder = tmp_path / "sweep.csv", tmp_path / "runs"
     arguments = ["--vary", f"{FRICTION}=0.02,0.06", "--table", str(table), "-o", str(folder), "--workers", "1"]

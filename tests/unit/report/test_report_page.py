@@ -239,6 +239,7 @@ def test_refused_path_writes_nothing(name, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_motion_from_python_or_a_file_comes_back_without_its_file(tmp_path):
     """A result file needs no other: the record may be gone, and no folder of this machine is in it."""
     t = np.linspace(0, 2, 201)

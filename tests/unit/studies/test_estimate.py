@@ -200,6 +200,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["mean", pytest.param("probability", marks=pytest.mark.slow)])
 def test_intervals_hold_the_truth(case):
     """Of a hundred intervals of 95 % at least 88 hold it (a chance of 0.4 % for fewer); exact runs are saved."""

@@ -283,6 +283,7 @@ def test_help_has_an_example(words, capsys):
     assert "msfp-gen bench work-precision" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_jump_of_the_motion_starts_the_libraries_anew():
     """The base accelerates, then holds its speed: an integrator that knew of one piece only would be lost after it."""
     knots, pieces = np.array([0.0, 0.05, 0.1]), np.zeros((2, 6, 6))

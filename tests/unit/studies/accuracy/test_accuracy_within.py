@@ -129,6 +129,7 @@ def own_bearing(**damping):
     return Scene(bearing, motion, top, Auto(dimension="planar"), duration=6.0)
 
 
+@pytest.mark.slow
 def test_the_stated_error_of_ones_own_triple_pendulum_is_true():
     scene = own_bearing()
     found = simulate_within(scene, 0.005)
