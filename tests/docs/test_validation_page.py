@@ -126,7 +126,8 @@ def test_tables_of_others_name_their_source() -> None:
         assert re.match(r"# .*\(.*commit [0-9a-f]{12}\)", path.read_text(encoding="utf-8")), path.name
 
 
-@pytest.mark.parametrize("part", ["circle_with_friction", pytest.param("sliding_block", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("part", ["circle_with_friction", "sliding_block"])
 def test_closed_forms_of_sliding_are_met(part: str) -> None:
     for series in getattr(external, part)():
         assert series.within == len(series.points)
