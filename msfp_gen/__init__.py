@@ -12,6 +12,7 @@ from msfp_gen.common.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.building import Building as Building
+    from msfp_gen.buildings.result import BuildingResult as BuildingResult
     from msfp_gen.buildings.scene import BuildingBearing as BuildingBearing
     from msfp_gen.buildings.scene import BuildingScene as BuildingScene
     from msfp_gen.buildings.storey import BaseSlab as BaseSlab
@@ -60,6 +61,7 @@ _MODULES = {
     "Body": "scene.bearing",
     "Building": "buildings.building",
     "BuildingBearing": "buildings.scene",
+    "BuildingResult": "buildings.result",
     "BuildingScene": "buildings.scene",
     "CompileError": "common.errors",
     "Effects": "specification.layout",
@@ -109,4 +111,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)  # without what this module itself needs

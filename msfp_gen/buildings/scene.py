@@ -344,6 +344,18 @@ class BuildingScene(OtherSystem):
 
         return quantities(self)
 
+    def __repr__(self) -> str:
+        """The parts in a few lines."""
+        layouts = ", ".join(dict.fromkeys(bearing.layout.name for bearing in self.every_bearing))
+        parts = {
+            "building": f"{len(self.building.mass)} coordinates, {len(self.building.nodes)} nodes, "
+            f"{self.weight * 1e-6:.4g} MN",
+            "bearings": f"{len(self.bearings)}, (n, m, p) = {layouts}",
+            "motion": f"{self.motion.name or 'unnamed'}, {self.motion.duration:g} s",
+            "solver": f"{self.solver.method}, rtol {self.solver.rtol:g}, until {self.end:.6g} s",
+        }
+        return "\n".join([f"BuildingScene {self.name}", *(f"  {name:<9}{text}" for name, text in parts.items())])
+
     def refusals(self) -> list[str]:
         """Why values can hardly be meant, as of `scene.plausibility.refusals`."""
         from msfp_gen.buildings.notes import refusals

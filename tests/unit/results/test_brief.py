@@ -62,6 +62,17 @@ def test_a_scene_prints_its_parts() -> None:
         assert words in "\n".join(lines)
 
 
+def test_a_building_prints_its_parts() -> None:
+    scene = load_scene("hospital-clc")
+    lines = repr(scene).splitlines()
+    assert len(lines) == 5 and lines[0] == "BuildingScene hospital-clc" and max(map(len, lines)) < 100
+    assert "15.09 MN" in lines[1] and "12, (n, m, p) = 5_2_2" in lines[2] and "ridgecrest-2019-ci-clc" in lines[3]
+
+
+def test_the_names_of_the_package_are_the_public_ones() -> None:
+    assert dir(msfp_gen) == sorted(msfp_gen.__all__) and msfp_gen.BuildingResult.__name__ == "BuildingResult"
+
+
 def test_a_characterisation_prints_its_main_values() -> None:
     found = preset_run("fenz-test2").characterise()
     lines = str(found).splitlines()
