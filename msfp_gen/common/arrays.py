@@ -12,6 +12,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+def distinct(values: Array) -> Array:
+    """The values in increasing order, each once, shape (k,) [unit of `values`]: `np.unique` imports masked arrays."""
+    ordered = np.sort(values, axis=None)
+    once: Array = ordered[np.append(True, ordered[1:] != ordered[:-1])[: len(ordered)]]
+    return once
+
+
 def parts(values: Any, shapes: Iterable[tuple[str, tuple[int, ...]]]) -> dict[str, Any]:
     """Parts of the last axis of an array by name, each of shape (..., *its own). shapes: names and shapes, in order."""
     columns, begin = {}, 0

@@ -7,7 +7,7 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import ArrayLike
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, distinct
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import LARGEST, Text
 from msfp_gen.motions import piecewise
@@ -134,8 +134,8 @@ def checked_pieces(
     shape = (len(k) - 1, len(channels), piecewise.ORDER)
     if c.shape != shape:
         raise InputError(f"coefficients: shape {c.shape}; give {shape}: pieces, channels, powers 0..5")
-    j = np.unique(j)
-    missing = j[~np.isin(j, k)]
+    j = distinct(j)
+    missing = j[k[np.minimum(np.searchsorted(k, j), len(k) - 1)] != j]
     if len(missing):
         raise InputError(f"jumps: {missing[0]:g} s is not a knot; put a knot there")
     for derivative, (quantity, remedy) in enumerate(_JUMPS):

@@ -98,7 +98,9 @@ class Motion:
 
         Samples are recognised by a longest step of two knot intervals; an analytic motion has many knots in a step.
         """
-        return self.max_step is not None and self.max_step <= 2.001 * float(np.median(np.diff(self.knots)))
+        between = np.sort(np.diff(self.knots))
+        median = (between[(len(between) - 1) // 2] + between[len(between) // 2]) / 2  # np.median imports masked arrays
+        return self.max_step is not None and self.max_step <= 2.001 * float(median)
 
     @cached_property
     def resolution(self) -> Resolution:

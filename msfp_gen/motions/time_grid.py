@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, distinct
 from msfp_gen.motions.piecewise import ORDER, polynomial, powers
 
 Flags = NDArray[np.bool_]
@@ -131,7 +131,7 @@ class TimeGrid:
         stops = distinct_times(np.concatenate([jumps, *(part.kinks for part in parts)]))
         jumps = matched(distinct_times(jumps), stops)
         stops = stops[(stops > 0) & (stops < end - TIME_TOLERANCE * max(1.0, end))]
-        ends = np.unique(np.concatenate([*(part.knots[1:] for part in parts), [end]]))
+        ends = distinct(np.concatenate([*(part.knots[1:] for part in parts), [end]]))
         middle = (np.append(0.0, ends[:-1]) + ends) / 2
         steps = np.full(len(ends), max_step)
         for part in parts:
@@ -144,9 +144,9 @@ class TimeGrid:
 
 def distinct_times(times: Array) -> Array:
     """Times, shape (k,) [s], in increasing order; of times that are equal to `TIME_TOLERANCE` only the first."""
-    ordered: Array = np.unique(times)
-    distinct = np.append(True, np.diff(ordered) > TIME_TOLERANCE * np.maximum(1.0, ordered[1:]))
-    kept: Array = ordered[distinct[: len(ordered)]]
+    ordered = distinct(times)
+    apart = np.append(True, np.diff(ordered) > TIME_TOLERANCE * np.maximum(1.0, ordered[1:]))
+    kept: Array = ordered[apart[: len(ordered)]]
     return kept
 
 

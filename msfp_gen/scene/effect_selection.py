@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, distinct
 from msfp_gen.common.later import kept
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.top import MassTop, RigTop, Top, load_values
@@ -58,7 +58,7 @@ def samples_of(scene: SceneFields) -> Samples:
 
 def _sampled(motion: Motion, end: float, load: Load | None) -> Samples:
     times = np.concatenate([motion.knots, () if load is None else load.knots, np.linspace(0, end, 1001)])
-    times = np.unique(times[times <= end])
+    times = distinct(times[times <= end])
     displacement, velocity, acceleration = (motion.evaluate(times, order)[:, :3] for order in range(3))
     peaks = (float(np.linalg.norm(values, axis=1).max()) for values in (velocity, acceleration))
     return Samples(times, displacement, acceleration, *peaks)

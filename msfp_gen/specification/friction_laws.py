@@ -27,7 +27,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from typing import Any, NamedTuple
 
 from msfp_gen.common.errors import InputError
@@ -349,6 +349,7 @@ def law_of(word: str, text: str | None = None) -> Law | None:
     return Law("custom", FRICTION["custom"], ast.unparse(tree), values)
 
 
+@cache
 def law_parameter_names() -> tuple[str, ...]:
     """Fields of `Surface` that are parameters of any friction law; they are None on a surface of constant friction."""
     names = dict.fromkeys(name for law in BUILT_IN.values() for name in law.parameters)

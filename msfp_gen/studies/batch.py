@@ -22,7 +22,7 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
@@ -318,7 +318,8 @@ def completed_runs(
         with local_pool(count, processes) as pool:
             for index, result in pool.results(_run, calls):
                 if processes and not isinstance(result, RunError) and type(result.scene) is type(scenes[index]):
-                    result = replace(result, scene=scenes[index])  # the one of the caller, not a copy
+                    # The one of the caller, not a copy; `replace` would make history and notes here, one by one.
+                    object.__setattr__(result, "scene", scenes[index])
                 yield index, result
                 del result
 

@@ -1,11 +1,13 @@
 """What a run is not asked for is not made, and what belongs to a motion is made once."""
 
 import pickle
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import scene_of
+from support import ROOT, scene_of
 from support.resuming import assert_same
 
 from msfp_gen import simulate
@@ -80,3 +82,13 @@ def test_an_entry_of_the_summary_needs_no_other(asked, monkeypatch):
         key: value for key, value in whole.items() if "time" not in key
     }
     assert result.entry("none") is None
+
+
+def test_the_first_run_of_a_process_imports_no_masked_arrays():
+    """Nor what reads files, draws figures or derives equations: `np.unique` and `np.median` import the former."""
+    code = (
+        "import sys; from msfp_gen import load_scene, simulate; simulate(load_scene('fenz-test2')); print(*sys.modules)"
+    )
+    modules = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    unwanted = {"numpy.ma", "sympy", "xarray", "h5py", "matplotlib", "scipy", "pint", "pandas", "pyarrow", "Cython"}
+    assert not unwanted & set(modules.split())

@@ -10,7 +10,7 @@ import threading
 import time
 from contextlib import suppress
 from dataclasses import fields, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -164,6 +164,7 @@ def test_every_number_is_that_of_simulate_in_processes() -> None:
     assert told == [(done, len(scenes)) for done in range(1, len(scenes) + 1)]
     for scene, result in zip(scenes, results, strict=True):
         assert result.scene is scene
+        assert isinstance(vars(result)["history"], partial), "rows travel, and make no history on their way"
         assert_same(result, alone(scene))
 
 
