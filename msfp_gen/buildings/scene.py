@@ -338,6 +338,12 @@ class BuildingScene(OtherSystem):
 
         return FIGURES
 
+    def structure(self, given: Mapping[str, Any]) -> Any:
+        """What a report shows of the superstructure, as of `report.analysis.structure_of`."""
+        from msfp_gen.buildings.modes import structure
+
+        return structure(self, given)
+
     def quantities(self) -> dict[str, Source]:
         """What tables report of a run, as of `results.quantities.quantities`."""
         from msfp_gen.buildings.quantities import quantities

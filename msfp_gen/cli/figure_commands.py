@@ -184,11 +184,13 @@ MOST = 5000  # instants in the interactive view; more would give a file of tens 
 @app.command(
     epilog="Examples:\n\n\b\n  msfp-gen run fenz-test5 -o out.nc\n  msfp-gen report out.nc -o report.html\n"
     '  msfp-gen report out.nc --project "Hospital, block B" --date 2026-03-01 --revision 2 --code "ASCE 7-22"\n'
-    "  msfp-gen report ridgecrest-clc   # runs it first, and writes ridgecrest-clc.html"
+    "  msfp-gen report ridgecrest-clc   # runs it first, and writes ridgecrest-clc.html\n"
+    '  msfp-gen report bounds --author "A. Author" --checker "B. Checker"   # of `bound --suite -o bounds`'
 )
 def report(
     source: Annotated[
-        str, typer.Argument(metavar="RUN", help="A result (.nc); or a scene file or preset, which is run first.")
+        str,
+        typer.Argument(metavar="RUN", help="A result (.nc), a scene file or preset, which is run first, or a folder."),
     ],
     output: Annotated[
         Path | None,
@@ -209,18 +211,35 @@ def report(
     code: Annotated[
         str, typer.Option(metavar="TEXT", help="Title block: the edition of the design code, such as ASCE 7-22.")
     ] = "",
+    author: Annotated[str, typer.Option(metavar="TEXT", help="Who signs the report of a suite.")] = "",
+    checker: Annotated[str, typer.Option(metavar="TEXT", help="Who checks the report of a suite.")] = "",
+    leave_out: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RECORD", help="A record of a suite that is not in its report; may be repeated."),
+    ] = None,
 ) -> None:
-    """Write a run as one HTML file that needs no network: numbers, settings, figures, the bearing in motion."""
+    """Write a run as one HTML file that needs no network: numbers, settings, figures, the bearing in motion.
+
+    Of the folder of `bound --suite FILE -o DIR` it writes the report of the whole analysis: inputs, bearing,
+    superstructure, ground motions, envelopes over records and bounds.
+    """
     from msfp_gen.common.output import check_output
-    from msfp_gen.report import FRAMES, REPORT_SUFFIXES, TitleBlock, write_report
+    from msfp_gen.report import FRAMES, REPORT_SUFFIXES, TitleBlock, write_analysis, write_report
+    from msfp_gen.report.analysis import is_suite_folder
 
     count = FRAMES if frames is None else frames
     if not 2 <= count <= MOST:
         raise InputError(f"--frames = {count}: give 2 to {MOST}")
     path = check_output(Path(f"{Path(source).stem}.html") if output is None else output, REPORT_SUFFIXES, "--output")
+    title = TitleBlock(project, device, date, revision, code, author, checker)
+    if is_suite_folder(source):
+        note(f"wrote {write_analysis(source, path, title, leave_out or ())}")
+        return
+    if leave_out:
+        raise InputError("--leave-out: it is for the report of a suite; give the folder of `bound --suite FILE -o DIR`")
     result, failure = result_of(load_source(source))
     with Progress("report") as progress:
-        write_report(result, path, count, progress, TitleBlock(project, device, date, revision, code))
+        write_report(result, path, count, progress, title)
     note(f"wrote {path}")
     note_exceeded({"": result.verdict})
     if failure is not None:

@@ -58,7 +58,7 @@ TERMS = (
 class TitleBlock:
     """What identifies a report in a project: texts; "" leaves an entry out. device: "" for the kind of the bearing.
 
-    code: the edition of the design code, such as "ASCE 7-22".
+    code: the edition of the design code, such as "ASCE 7-22". author, checker: names of those who sign.
     """
 
     project: str = ""
@@ -66,6 +66,8 @@ class TitleBlock:
     date: str = ""
     revision: str = ""
     code: str = ""
+    author: str = ""
+    checker: str = ""
 
     def rows(self, device: str) -> list[tuple[str, str]]:
         """Names and texts of the entries that are given, the device in any case; `device`: its kind."""

@@ -51,6 +51,7 @@ RUN = {
     "verdict": Quantity("", "verdict.word"),
     "verdict_text": Quantity("", "verdict.text"),
     "limits_exceeded": Quantity("", "verdict.limits", kept=True),
+    "limits_reached": Quantity("", "verdict.largest"),  # as JSON: of every limit the value largest over what is allowed
     "closure_error": Quantity("", "energy.closure_error"),
     "steps": Quantity("", "counters.steps", extreme="most"),
     "wall_time": Quantity("s", "wall_time"),

@@ -54,7 +54,7 @@ TRIED = 1000  # numbers of one axis that are tried before the first run, at leas
 PARTS = 64  # parts of a study, at least, unless these would have fewer than LEAST runs
 LEAST, MOST = 8, 256  # runs of a chunk where the study file does not give `chunk`
 OF_RECORDS = ("record", "scale")  # names of axes that [records] reserves
-RECORD_KEYS = ("suite", "motions", "scales", "intensity")
+RECORD_KEYS = ("suite", "motions", "scales", "intensity", "target")
 NOUN = "a table with motions or the file of a suite, and scales"
 COMPONENTS = ("E1", "E2", "E3", "geomean", "rotd50", "rotd100")
 KEYS = {
@@ -361,7 +361,12 @@ def _records(
         intensities = {record.name: measure.of(record.motion) for record in suite.records}
         if weak := [name for name, value in intensities.items() if not value > 0]:
             raise InputError(f"records.intensity: record {weak[0]!r} has none in this component; give another")
-    complete = {"motions": [*tables.values()], "scales": scales, "intensity": table.get("intensity")}
+    complete = {
+        "motions": [*tables.values()],
+        "scales": scales,
+        "intensity": table.get("intensity"),
+        "target": suite.target or table.get("target"),  # of the factors, for reports; the motions have the factors
+    }
     return axes, tables, intensities, complete
 
 

@@ -146,6 +146,11 @@ def load_sheet(source: str | Path) -> tuple[str, Sheet, Bearing]:
         return name if isinstance(name, str) and name else path.stem, Sheet(**valid["sheet"]), _bearing(valid)
 
 
+def parsed_sheet(table: Mapping[str, Any]) -> Sheet:
+    """The data sheet of a `[bearing]` table with the key `sheet`. Raises InputError."""
+    return Sheet(**schema.validate_part("bearing", dict(table))["sheet"])
+
+
 def complete_bearing(table: Mapping[str, Any]) -> Table:
     """A `[bearing]` table that states every surface and body, in SI units, of one that names a preset or is complete.
 
@@ -305,10 +310,11 @@ class SuiteRecord:
 
 @dataclass(frozen=True)
 class Suite:
-    """The motions of a suite; scaled: their spectra, where the suite is scaled to a mean spectrum."""
+    """The motions of a suite; of one scaled to a mean spectrum, their spectra, and the table of the target."""
 
     records: tuple[SuiteRecord, ...]
     scaled: ScaledSuite | None
+    target: Table | None = None
 
 
 def load_suite(path: str | Path, progress: Callable[[float, float], None] | None = None) -> Suite:
@@ -354,7 +360,7 @@ def _suite(tables: list[Table], target: Table | None, progress: Callable[[float,
     share = values.pop("least_share", None)
     scaled = scaled_suite([record.motion for record in _records(tables)], ScaleTo(**values), share, progress)
     factors = scaled.factors.tolist()
-    return Suite(_records([{**table, "scale": f} for table, f in zip(tables, factors, strict=True)]), scaled)
+    return Suite(_records([{**table, "scale": f} for table, f in zip(tables, factors, strict=True)]), scaled, target)
 
 
 def _records(tables: list[Table]) -> tuple[SuiteRecord, ...]:

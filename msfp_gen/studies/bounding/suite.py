@@ -38,7 +38,8 @@ Run = tuple[str, str]  # names of a record and of a case
 # Quantities of the figure, where the runs have them.
 DRAWN = ("peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "capacity_left")
 WORST: dict[str, Callable[..., Any]] = {"most": np.nanmax, "least": np.nanmin}
-OF_RUN = ("duration", "verdict", "verdict_text")  # kept beside the quantities of which a value governs
+# Kept beside the quantities of which a value governs.
+OF_RUN = ("duration", "verdict", "verdict_text", "limits_reached", "closure_error", "steps")
 NO_VALUE = "some runs that reached their end have no such value"
 
 
@@ -217,6 +218,38 @@ def bound_suite(
         folder = Path(temporary if output is None else output)
         run_on(pool, study, folder, progress=progress, without=without)
         return _from_rows(study, folder, leave_out)
+
+
+def load_suite_bounds(folder: str | Path, leave_out: Collection[str] = ()) -> tuple[Study, SuiteBounds]:
+    """The study in the folder of `bound_suite`, and its result.
+
+    Raises InputError: no such folder, a file of the inputs or the program has changed, an unknown record, or a run that
+    is missing; RunError as of `bound_suite`.
+    """
+    from msfp_gen.studies.definition import load_study
+    from msfp_gen.studies.run import STUDY_FILE, Chunks, study_table
+
+    folder = Path(folder)
+    about = study_table(folder)["about"]
+    study = load_study(folder / STUDY_FILE)
+    if [axis.name for axis in study.axes] != ["record", "bounds"]:
+        raise InputError(
+            f"{str(folder)!r}: no suite at bounds; give the folder of `msfp-gen bound --suite FILE -o DIR`"
+        )
+    check_left_out(leave_out, study)
+    chunks = Chunks(study, folder)
+    if chunks.digest != about.get("digest"):
+        raise InputError(
+            f"{str(folder)!r}: inputs or program have changed since its runs; run `msfp-gen bound` into another folder"
+        )
+    for number in range(study.chunks):
+        ((_, labels),) = chunks.study.task(number).rows(study.axes)
+        if labels[0] not in leave_out and not chunks.path(chunks.study.task(number)).is_file():
+            raise InputError(
+                f"{str(folder)!r}: no run of {labels[0]} at {labels[1]}; continue `msfp-gen bound`, or give its "
+                "record to --leave-out"
+            )
+    return study, _from_rows(study, folder, leave_out)
 
 
 def check_left_out(leave_out: Collection[str], study: Study) -> None:

@@ -1,0 +1,400 @@
+"""The report of a whole analysis: the suite at bounds in a folder -> a page of numbered sections, tables and figures.
+
+All numbers are those of the rows that `msfp-gen bound --suite -o` wrote, and of the inputs named in its folder.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import singledispatch
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
+from msfp_gen.common.tables import Table
+from msfp_gen.common.version import __version__
+from msfp_gen.figures.sheet import plot_sheet
+from msfp_gen.figures.style import CASE_COLOURS, COLOURS, FAINT, INK, THIN, distinct, headline, page, panels, plain
+from msfp_gen.report.frames import picture, render, write_page
+from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of
+from msfp_gen.scene.explain import explain
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.sheet import Sheet
+from msfp_gen.studies.bounding import CASES, SuiteBounds, load_suite_bounds
+from msfp_gen.studies.bounding.runs import shown_as
+from msfp_gen.studies.bounding.suite import plot_suite_bounds, suite_bound_tables
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from msfp_gen.studies.definition import Study
+
+G = 9.80665  # [m/s^2]
+PERIODS = np.geomspace(0.05, 6.0, 60)  # of the spectra [s]
+Captioned = tuple[str, "Figure"]
+# Quantities of parts, by section: column without its number.
+FLOORS = ("floor_corner_acceleration", "storey_corner_drift_ratio", "storey_shear")
+BEARINGS = ("bearing_displacement", "bearing_load_ratio", "bearing_maximum_load_ratio")
+UPLIFT = ("bearing_uplift_height", "bearing_uplift_duration")
+# What the parts of the program were compared with: part, reference, page of the documentation.
+COMPARED = (
+    ("forces and motions of a bearing", "tests and models of PEER 2017/07 and of Fenz and Constantinou (2008), closed "
+     "forms of friction circles", "validation"),
+    ("solution of the equations", "a second formulation and other integrators on the same scenes, energy balance of "
+     "every run", "verification"),
+    ("bearings in other programs", "elements of OpenSees", "opensees"),
+    ("superstructure on its bearings", "closed forms, an eccentric frame under a record in OpenSees", "buildings"),
+    ("factors of bounds", "the rules of the codes by hand; tables as the literature quotes them", "bounding"),
+    ("response spectra, scaling", "closed forms and an independent integration", "data"),
+    ("effective properties of a sheet", "published devices, by hand", "sheet"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the report: title, paragraphs, tables, and figures with their captions."""
+
+    title: str
+    words: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    figures: Sequence[Captioned] = ()
+
+
+@singledispatch
+def structure_of(scene: Any, given: Mapping[str, Any]) -> tuple[list[Table], list[Captioned]]:
+    """Tables and figures of the superstructure of a system. given: its table in the file."""
+    found: tuple[list[Table], list[Captioned]] = scene.structure(given)
+    return found
+
+
+@structure_of.register(Scene)
+def _no_structure(_: Scene, __: Mapping[str, Any]) -> tuple[list[Table], list[Captioned]]:
+    return [], []
+
+
+def write_analysis(
+    folder: str | Path, path: str | Path, title: TitleBlock = NO_TITLE, leave_out: Collection[str] = ()
+) -> Path:
+    """Write the report of a suite at bounds; the file appears only when complete, and loads no other file.
+
+    Args:
+        folder: that `bound_suite` wrote.
+        path: of the page.
+        title: what identifies the report.
+        leave_out: names of records that are not part of it.
+
+    Raises InputError: as of `load_suite_bounds`, or a path that does not end in .html or cannot be written.
+    """
+    return write_page(path, lambda: analysis_html(folder, title, leave_out))
+
+
+def analysis_html(folder: str | Path, title: TitleBlock = NO_TITLE, leave_out: Collection[str] = ()) -> str:
+    """The report of a suite at bounds as text; arguments and errors as of `write_analysis`."""
+    from msfp_gen.studies.assessment.rows import read_study
+    from msfp_gen.studies.run import Chunks
+
+    study, bounds = load_suite_bounds(folder, leave_out)
+    rows = read_study(folder)
+    rows = rows[~rows["record"].isin(list(leave_out))]
+    scene = study.scene(1)
+    sections = [part for part in _sections(study, bounds, rows, scene) if part.tables or part.figures or part.words]
+    exceeded, failed = bool(bounds.exceeded), bool(bounds.failures or bounds.stopped)
+    device = ", ".join(dict.fromkeys(map(kind_of, scene.every_bearing)))
+    return render(
+        "analysis.html.jinja",
+        name=f"{bounds.name or 'unnamed scene'}: response history analysis at bounds",
+        kind="analysis",
+        title_block=replace(title, author="", checker="").rows(device),
+        signatures=(("author", title.author), ("checker", title.checker)),
+        identity=Chunks(study, Path(folder)).identity,
+        lead=_lead(bounds, rows),
+        outcome=_outcome(bounds),
+        verdict="failed" if failed else "exceeded" if exceeded else "within",
+        sections=list(_numbered(sections)),
+        terms=TERMS,
+    )
+
+
+def _numbered(sections: Sequence[Section]) -> Iterator[dict[str, Any]]:
+    """Sections for the template, with numbers of tables and figures through the whole report."""
+    tables = figures = 0
+    for number, section in enumerate(sections, start=1):
+        shown_tables = []
+        for table in section.tables:
+            tables += 1
+            shown_tables.append(Table(f"Table {tables}. {table.title}", table.columns, table.rows))
+        shown_figures = []
+        for caption, figure in section.figures:
+            figures += 1
+            shown_figures.append(picture(f"Figure {figures}. {caption}", figure))
+        yield {
+            "number": number,
+            "title": section.title,
+            "words": section.words,
+            "tables": shown_tables,
+            "figures": shown_figures,
+        }
+
+
+def _sections(study: Study, bounds: SuiteBounds, rows: Any, scene: Any) -> Iterator[Section]:
+    first, *others = suite_bound_tables(bounds)
+    figure = plot_suite_bounds(bounds)
+    caption = "Main quantities over the bounds, each record in a colour of its own"
+    yield Section(
+        "Envelope over records and bounds", (), [first, *others, limit_table(bounds, rows)], [(caption, figure)]
+    )
+    yield _bearing_section(study, scene)
+    tables, figures = structure_of(scene, study.table["scene"].get("building", {}))
+    yield Section("Superstructure", (), tables, figures)
+    yield _motion_section(study, bounds)
+    yield _part_section(bounds, "Floor accelerations, drifts and storey shears", FLOORS)
+    yield _part_section(bounds, "Displacements and axial forces of the bearings", BEARINGS, _rest(bounds))
+    yield _part_section(bounds, "Uplift", UPLIFT)
+    yield Section("Energy and numerical error", _energy(rows))
+    words = "Every comparison with its source, tolerance and difference is on the page named, of the documentation."
+    compared = Table(
+        "parts of the program, and what each was compared with", ("part", "compared with", "page"), COMPARED
+    )
+    yield Section("Which parts of the program were compared with what", (words,), [compared])
+    yield Section("Settings", (), [*explain(scene), _files(study)])
+
+
+def _lead(bounds: SuiteBounds, rows: Any) -> str:
+    left = f", {', '.join(bounds.left_out)} left out" if bounds.left_out else ""
+    count = len(bounds.records)
+    motions = f"{count} ground motion{'s' * (count > 1)}{left}"
+    return (
+        f"{motions}, each at lower bound, nominal and upper bound of the bearings by "
+        f"{bounds.factors}: {len(rows)} nonlinear response histories, by msfp-gen {__version__}."
+    )
+
+
+def _outcome(bounds: SuiteBounds) -> str:
+    runs = bounds.ended.size
+    early = len(bounds.failures) + len(bounds.stopped)
+    ended = f"{early} of {runs} runs did not reach their end" if early else f"All {runs} runs reached their end"
+    exceeded = len(bounds.exceeded)
+    limits = (
+        f"{exceeded} of {runs} exceeded limits of the device" if exceeded else "none exceeded a limit of the device"
+    )
+    return f"{ended}; {limits}."
+
+
+def limit_table(bounds: SuiteBounds, rows: Any) -> Table:
+    """The largest share of every limit of the device by bound, with its record, value and place."""
+    cases = {case: _reached(rows[rows["bounds"] == case]) for case in CASES}
+    names = {key: None for found in cases.values() for key in found}
+    shown = []
+    for name in names:
+        shares = [cases[case].get(name) for case in CASES]
+        worst = max((one for one in shares if one is not None), key=lambda one: one["share"])
+        cells = ("-" if one is None else f"{100 * one['share']:.3g} %" for one in shares)
+        unit, scale = shown_as(worst["unit"]) if worst["unit"] else ("", 1.0)
+        values = (f"{worst[key] * scale:.4g} {unit}".rstrip() for key in ("value", "allowed"))
+        shown.append((name.replace("_", " "), *cells, *values, worst["record"] if worst["share"] else "-"))
+    columns = ("limit", *CASES, "largest", "allowed", "record")
+    return Table("share of every limit of the device that the worst run reached (docs/limits.md)", columns, shown)
+
+
+def _reached(rows: Any) -> dict[str, dict[str, Any]]:
+    """Limit -> the reading with the largest share over some runs, with its share and record."""
+    most: dict[str, dict[str, Any]] = {}
+    for record, text in zip(rows["record"], rows["limits_reached"], strict=True):
+        for reading in json.loads(text) if isinstance(text, str) and text else ():
+            value, allowed = reading["value"], reading["allowed"]
+            share = value / allowed if allowed > 0 else float("inf") if value > 0 else 0.0
+            key = reading["limit"]
+            if key not in most or share > most[key]["share"]:
+                most[key] = {**reading, "share": share, "record": record}
+    return most
+
+
+def _bearing_section(study: Study, scene: Any) -> Section:
+    """The data sheets of the scene; without one the bearing is among the settings."""
+    from msfp_gen.design.sheet import SheetReport
+    from msfp_gen.scene.file.loader import bearing_from_table, parsed_sheet
+
+    tables: list[Table] = []
+    figures: list[Captioned] = []
+    for name, given in _bearings(study.table["scene"]):
+        if "sheet" not in given:
+            continue
+        data: Sheet = parsed_sheet(given)
+        report = SheetReport(name, data, bearing_from_table(given))
+        tables += report.tables
+        figures.append((f"{name}: section to scale, published backbone and effective properties", plot_sheet(report)))
+    words = () if tables else ("The bearing is given surface by surface: see Settings.",)
+    return Section("Bearing", words, tables, figures)
+
+
+def _bearings(table: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Name and table of every kind of bearing of a scene."""
+    if isinstance(one := table.get("bearing"), Mapping):
+        yield str(table.get("name") or "bearing"), one
+    yield from table.get("bearings", {}).items()
+
+
+def _motion_section(study: Study, bounds: SuiteBounds) -> Section:
+    from msfp_gen.motions.records import ScaleTo
+    from msfp_gen.motions.records.record_tables import suite_tables
+    from msfp_gen.motions.records.spectrum import MEASURES, response_spectrum
+    from msfp_gen.scene.file.loader import suite_from_table
+
+    records = [
+        record
+        for record in suite_from_table({"records": study.table["records"]["motions"]}, None).records
+        if record.name in bounds.records
+    ]
+    target = dict(study.table["records"].get("target") or {})
+    share = target.pop("least_share", None)
+    scale_to = ScaleTo(**target) if target else None
+    component = scale_to.component if scale_to else "rotd50"
+    damping = scale_to.damping if scale_to else 0.05
+    spectra = {record.name: response_spectrum(record.motion, PERIODS, damping=damping).psa / G for record in records}
+    names, motions = [record.name for record in records], [record.motion for record in records]
+    corrections = [
+        (
+            name,
+            str(m.metadata.get("correction", "none")),
+            str(m.metadata.get("file", m.metadata.get("name", "")) or "-"),
+        )
+        for name, m in zip(names, motions, strict=True)
+    ]
+    tables = [*suite_tables(names, motions, None), Table("correction", ("record", "correction", "source"), corrections)]
+    words = [f"Spectra of {100 * damping:g} % damping. All three components of a record have one factor."]
+    if scale_to:
+        least = "" if share is None else f"; the mean is nowhere below {100 * share:g} % of it there"
+        words.append(f"The factors bring the mean of the records to the target: {scale_to}{least}.")
+    column = MEASURES.index(component)
+    curve = scale_to.curve(PERIODS) if scale_to else None
+    horizontal, vertical = ({name: psa[:, c] for name, psa in spectra.items()} for c in (column, 2))
+    between = scale_to.between if scale_to else None
+    figure = _plot_spectra(horizontal, curve, component, vertical, between)
+    caption = f"Pseudo-acceleration of the scaled motions, {component} and vertical, their means and the target"
+    return Section("Ground motions", words, tables, [(caption, figure)])
+
+
+def _plot_spectra(
+    horizontal: Mapping[str, Array],
+    target: tuple[Array, Array] | None,
+    component: str,
+    vertical: Mapping[str, Array],
+    between: tuple[float, float] | None,
+) -> Figure:
+    with page(11.5, 4.6) as figure:
+        headline(figure, "Spectra of the scaled ground motions")
+        row = panels(figure, f"horizontal, {component}", "vertical")
+        colours = distinct(len(horizontal))
+        for axes, spectra in zip(row, (horizontal, vertical), strict=True):
+            for (name, values), colour in zip(spectra.items(), colours, strict=True):
+                axes.plot(PERIODS, values, color=colour, linewidth=THIN, label=plain(name))
+            axes.plot(PERIODS, np.mean(list(spectra.values()), axis=0), color=INK, linewidth=2.2, label="mean")
+            axes.set(xscale="log", xlabel="period T [s]", ylabel="pseudo-acceleration [g]")
+            axes.set_xticks([0.05, 0.1, 0.2, 0.5, 1, 2, 5], ["0.05", "0.1", "0.2", "0.5", "1", "2", "5"])
+            axes.minorticks_off()
+            axes.set_ylim(bottom=0.0)
+        if target is not None:
+            row[0].plot(target[0], np.asarray(target[1]) / G, color=COLOURS[1], linestyle="--", linewidth=2.2,
+                        label="target")  # fmt: skip
+        if between:
+            row[0].axvspan(*between, color=FAINT, alpha=0.12, label="compared here")
+        handles, labels = row[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside right center")
+    return figure
+
+
+def _part_section(bounds: SuiteBounds, title: str, quantities: Sequence[str], words: Sequence[str] = ()) -> Section:
+    """Means and worst values of quantities of parts by bound: a table for each, and one figure."""
+    tables, drawn = [], {}
+    for quantity in quantities:
+        parts = [one for one in bounds.statistics if one.part and one.name.rpartition("_")[0] == quantity]
+        if not any(value for one in parts for value in (*one.worst, *one.means) if value):  # nothing lifted off
+            continue
+        drawn[quantity] = parts
+        unit, scale = shown_as(parts[0].unit)
+        rows = [
+            (
+                one.part,
+                *("-" if v is None else f"{v * scale:.4g}" for v in (*one.means, *one.worst)),
+                one.governs or "-",
+                one.record,
+            )
+            for one in reversed(parts)
+        ]
+        columns = ("part", *(f"mean {c}" for c in CASES), *(f"worst {c}" for c in CASES), "governs", "worst record")
+        tables.append(Table(f"{_words_of(bounds, parts[0])} [{unit}]", columns, rows))
+    if not drawn:
+        return Section(title)
+    caption = "Each part at each bound: mean over the records (lines) and worst record (dots)"
+    return Section(title, words, tables, [(caption, _plot_parts(bounds, drawn, title))])
+
+
+def _plot_parts(bounds: SuiteBounds, drawn: Mapping[str, Sequence[Any]], title: str) -> Figure:
+    most = max(map(len, drawn.values()))
+    with page(11.5, 2.2 + 0.16 * min(max(most, 8), 40)) as figure:
+        headline(figure, title)
+        row = panels(figure, *(_words_of(bounds, parts[0]) for parts in drawn.values()))
+        for axes, parts in zip(row, drawn.values(), strict=True):
+            unit, scale = shown_as(parts[0].unit)
+            place = np.arange(len(parts))
+            for index, case in enumerate(CASES):
+                for values, style in (([p.means[index] for p in parts], "-"), ([p.worst[index] for p in parts], "o")):
+                    shown = [np.nan if value is None else value * scale for value in values]
+                    label = case if style == "-" else None
+                    axes.plot(shown, place, style, color=CASE_COLOURS[case], markersize=4, label=label)
+            axes.set_yticks(place, [plain(one.part) for one in parts])
+            axes.set_xlabel(f"[{unit}]")
+            axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
+        row[-1].legend(loc="upper left", bbox_to_anchor=(1.02, 1))
+    return figure
+
+
+def _words_of(bounds: SuiteBounds, statistic: Any) -> str:
+    return bounds.sources[statistic.name].words(statistic.name).removesuffix(f" of {statistic.part}")
+
+
+def _rest(bounds: SuiteBounds) -> tuple[str, ...]:
+    """What is known of the residual displacement, in words."""
+    if "residual_displacement" in bounds.undefined:
+        return ("No residual displacement is stated: some runs end while the structure still moves.",)
+    found = [one for one in bounds.statistics if one.name == "residual_displacement"]
+    return tuple(f"Residual displacement: at most {1e3 * one.envelope[1]:.4g} mm, under {one.record}." for one in found)
+
+
+def _energy(rows: Any) -> list[str]:
+    """What the energy balances of the runs say, in words."""
+    error = rows["closure_error"].dropna().abs()
+    if error.empty:
+        return []
+    worst = rows.loc[error.idxmax()]
+    lines = [
+        "Every run keeps the balance of its energy: work of the ground and the loads, less what is stored and "
+        "dissipated. "
+        f"What remains is the error of the computation: at most {100 * error.max():.2g} % of the energy put in "
+        f"({worst['record']}, {worst['bounds']}), {100 * error.median():.2g} % in the median run."
+    ]
+    lines.append(f"The runs took {int(rows['steps'].min())} to {int(rows['steps'].max())} time steps.")
+    return lines
+
+
+def _files(study: Study) -> Table:
+    """Every file that was opened, with the digest of its bytes; no folders."""
+    rows = [(Path(path).name, digest) for path, digest in study.files.items()]
+    return Table("files of the inputs, with their SHA-256", ("file", "SHA-256"), rows or [("none", "-")])
+
+
+def is_suite_folder(source: str | Path) -> bool:
+    """Whether a source of `msfp-gen report` is a folder. Raises InputError for one without a study."""
+    from msfp_gen.studies.run import STUDY_FILE
+
+    path = Path(source)
+    if path.is_dir() and not (path / STUDY_FILE).is_file():
+        raise InputError(
+            f"{str(source)!r}: no {STUDY_FILE} here; give the folder of `msfp-gen bound --suite FILE -o DIR`"
+        )
+    return path.is_dir()

@@ -1,0 +1,174 @@
+"""The report of a suite at bounds: its numbers, numbered parts, what it refuses, and that it loads no other file."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import ROOT
+
+from msfp_gen import InputError, simulate
+from msfp_gen.buildings.modes import modes_of
+from msfp_gen.cli import main
+from msfp_gen.report import TitleBlock, analysis_html, write_analysis
+from msfp_gen.report.analysis import limit_table
+from msfp_gen.scene.file.source import scene_of
+from msfp_gen.studies.assessment.rows import read_study
+from msfp_gen.studies.bounding import CASES, bound_suite, load_suite_bounds, suite_study
+
+SUITE = """
+records = [
+    { bundled = "ridgecrest-2019-ci-ccc", duration = 5.0, name = "CCC" },
+    { bundled = "ridgecrest-2019-ci-clc", duration = 5.0, name = "CLC <b>" },
+]
+scale_to = { sds = "1 g", sd1 = "0.6 g", between = [1.0, 3.0], component = "rotd100" }
+"""
+SHEET = {
+    "device": "triple",
+    "radius": [2.2, 0.4],
+    "height": [0.115, 0.055],
+    "friction": [0.06, 0.025, 0.025, 0.09],
+    "friction_lower": [0.045, 0.015, 0.015, 0.07],
+    "friction_upper": [0.08, 0.04, 0.04, 0.12],
+    "slider_diameter": [0.35, 0.2],
+    "dish_diameter": [0.9, 0.27],
+    "axial_load": 760e3,
+}
+
+
+def building() -> dict[str, Any]:
+    """The building of the examples on bearings of a data sheet."""
+    table = tomllib.loads((ROOT / "examples" / "building" / "building.toml").read_text(encoding="utf-8"))
+    table["bearings"]["isolator"] = {"sheet": SHEET}
+    table["building"]["effects"] = {"bouc_wen": "plastic"}
+    table["motion"]["duration"] = "5 s"
+    return table
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: Any) -> Path:
+    folder = Path(tmp_path_factory.mktemp("suite"))
+    (folder / "suite.toml").write_text(SUITE)
+    bound_suite(suite_study(building(), folder / "suite.toml", "sheet"), folder / "out")
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def html(folder: Path) -> str:
+    return analysis_html(folder, TitleBlock(project="Block B", author="A. Author"))
+
+
+def texts(html: str) -> str:
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", html))
+
+
+def test_parts_of_the_report_are_numbered_and_listed(html: str) -> None:
+    titles = re.findall(r'<h2 id="part-(\d+)">\d+\. (.*?)</h2>', html)
+    assert [int(number) for number, _ in titles] == list(range(1, len(titles) + 1))
+    wanted = ("Envelope", "Bearing", "Superstructure", "Ground motions", "Floor", "Displacements", "Energy", "Which")
+    found = [title for _, title in titles]
+    assert [next(title for title in found if title.startswith(word)) for word in wanted]
+    contents = html[html.index('class="contents"') : html.index('id="part-1"')]
+    for kind, tag in (("Table", "caption"), ("Figure", "figcaption")):
+        numbers = [int(n) for n in re.findall(rf"<{tag}>{kind} (\d+)\.", html)]
+        assert numbers == list(range(1, len(numbers) + 1)) and len(numbers) > 3
+        assert [int(n) for n in re.findall(rf"<li>{kind} (\d+)\.", contents)] == numbers
+
+
+def test_page_one_names_inputs_author_and_checker(html: str, folder: Path) -> None:
+    text = texts(html[: html.index('class="contents"')])
+    assert re.search(r"SHA-256 [0-9a-f]{64}", text)
+    assert "author A. Author date, signature" in text and "checker date, signature" in text
+    assert text.count("A. Author") == 1 and "project Block B" in text
+    assert "All 6 runs reached their end; none exceeded a limit of the device." in text
+    assert analysis_html(folder) == analysis_html(folder)
+
+
+def test_the_report_loads_nothing_and_escapes_names(html: str, folder: Path) -> None:
+    assert not re.search(r"(src|href)=\"(?!data:|#)", html) and "default-src 'none'" in html
+    assert "CLC &lt;b&gt;" in html and "CLC <b>" not in html
+    assert str(folder.parent) not in html, "no folder of the machine"
+
+
+def test_envelope_and_parts_are_those_of_the_rows(html: str, folder: Path) -> None:
+    """Means and worst values from the rows of the study, by hand."""
+    text, rows = texts(html), read_study(folder)
+    drift = rows["storey_corner_drift_ratio_1"].to_numpy().reshape(2, 3)
+    cells = " ".join(f"{100 * v:.4g}" for v in (*drift.mean(axis=0), *drift.max(axis=0)))
+    assert f"storey 1 {cells}" in text
+    peak = rows["peak_displacement"].to_numpy().reshape(2, 3) * 1e3
+    assert "peak displacement [mm] " + " ".join(f"{v:.4g}" for v in (*peak.mean(axis=0), *peak.max(axis=0))) in text
+    assert f"at most {100 * rows['closure_error'].abs().max():.2g} % of the energy put in" in text
+
+
+def test_shares_of_limits_are_those_of_the_runs(folder: Path) -> None:
+    """The share of a limit over the records at one bound, from runs made again."""
+    study, bounds = load_suite_bounds(folder)
+    table = limit_table(bounds, read_study(folder))
+    runs = [simulate(study.scene(1 + CASES.index("upper") + len(CASES) * record)) for record in range(2)]
+    assert {row[0] for row in table.rows} == {key.replace("_", " ") for run in runs for key in run.verdict.worst}
+    for name, _, _, upper, *_ in table.rows:
+        share = max(run.verdict.worst[name.replace(" ", "_")].share for run in runs)
+        assert float(upper.removesuffix(" %")) == pytest.approx(100 * share, rel=6e-3, abs=1e-9)
+
+
+def test_target_and_sheet_are_on_the_page(html: str) -> None:
+    text = texts(html)
+    assert "target: rotd100 to the ASCE 7 spectrum of 9.807 and 5.884 m/s^2, least squares from 1 to 3 s" in text
+    assert "isolator: triple pendulum, axial load 760 kN" in text and "by sheet" in text
+    assert "each record in a colour" in text and "storeys as given" in text and "100 t" in text
+
+
+def test_modes_are_those_of_closed_form() -> None:
+    """Two equal masses on equal springs: 0.618 and 1.618 of the frequency of one; masses add up to what is above."""
+    table = building()
+    for storey in table["building"]["storey"]:
+        storey.update(mass=1e5, stiffness=1e8, mass_centre=[0.0, 0.0])
+    del table["building"]["highest_frequency"]
+    scene: Any = scene_of(table)
+    modes = modes_of(scene)
+    along = np.argsort(-modes.participating[:, 0])[:2]
+    single = np.sqrt(1e8 / 1e5) / (2 * np.pi)
+    golden = (np.sqrt(5) - 1) / 2
+    assert modes.frequencies[along] == pytest.approx([single * golden, single / golden], rel=1e-9)
+    effective = np.array([(1 + 1 / golden) ** 2 / (1 + 1 / golden**2), (1 - golden) ** 2 / (1 + golden**2)])
+    assert modes.participating[along, 0] == pytest.approx(effective * 1e5 / 3.1e5, rel=1e-9)
+    assert modes.participating.sum(axis=0)[:2] == pytest.approx([2 / 3.1, 2 / 3.1], rel=1e-9)
+    assert np.abs(modes.shapes).max(axis=(1, 2))[along] == pytest.approx([1.0, 1.0])
+
+
+def test_a_record_left_out_is_not_in_the_report(folder: Path, tmp_path: Path) -> None:
+    assert main(["report", str(folder), "-o", str(tmp_path / "a.html"), "--leave-out", "CCC"]) == 0
+    text = texts((tmp_path / "a.html").read_text(encoding="utf-8"))
+    assert "1 ground motion, CCC left out" in text
+    assert "3 nonlinear response histories" in text
+
+
+def cases(folder: Path, copy: Path) -> Iterator[tuple[list[str], str]]:
+    yield [str(copy.parent)], "no study.toml here"
+    yield [str(copy), "--leave-out", "XYZ"], "no record of the suite"
+    next(copy.glob("part-0000004-*")).unlink()
+    yield [str(copy)], "no run of CLC <b> at nominal; continue"
+    study = (copy / "study.toml").read_text(encoding="utf-8")
+    (copy / "study.toml").write_text(study.replace('mass = "110 t"', 'mass = "120 t"'), encoding="utf-8")
+    yield [str(copy)], "inputs or program have changed"
+    yield ["fenz-test2", "--leave-out", "CCC"], "give the folder of `bound --suite"
+
+
+def test_what_cannot_be_reported_is_one_line(folder: Path, tmp_path: Path, capsys: Any) -> None:
+    import shutil
+
+    copy = Path(shutil.copytree(folder, tmp_path / "inner" / "copy"))
+    page = tmp_path / "page.html"
+    for arguments, words in cases(folder, copy):
+        assert main(["report", *arguments, "-o", str(page)]) == 2, words
+        said = capsys.readouterr().err
+        assert words in said and len(said.strip().splitlines()) == 1
+        assert not page.exists()
+    with pytest.raises(InputError, match=r"\.html"):
+        write_analysis(folder, tmp_path / "page.txt")
