@@ -79,24 +79,27 @@ def test_scene_files_and_folders_are_offered(tmp_path, monkeypatch):
 
 
 def test_progress_says_how_long_it_still_takes(capsys, monkeypatch):
-    clock = iter([0.0, 0.5, 4.0])
-    monkeypatch.setattr("msfp_gen.cli.console.monotonic", lambda: next(clock))
+    now = [0.0]
+    monkeypatch.setattr("msfp_gen.cli.console.monotonic", lambda: now[0])
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     with Progress("long") as update:
-        update(1.0, 10.0)
-        update(2.5, 10.0)
+        for now[0], done in ((0.5, 1.0), (4.0, 2.5)):
+            update(done, 10.0)
     err = capsys.readouterr().err
     assert "long: 10 %\r" in err and "long: 25 %, 12 s left" in err
 
 
 def test_progress_of_a_build_says_what_is_done_and_how_long_it_takes(capsys, monkeypatch):
-    clock = iter([0.0, 0.0, 0.0, 1.0, 4.0, 5.1])
-    monkeypatch.setattr("msfp_gen.cli.console.monotonic", lambda: next(clock))
+    now = [0.0]
+    monkeypatch.setattr("msfp_gen.cli.console.monotonic", lambda: now[0])
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     with building() as tell:
         tell("deriving 7_3_3", 0.0)
+        now[0] = 1.0
         tell("compiling (0 of 2 files)", 0.25)
+        now[0] = 4.0
         tell("compiling (1 of 2 files)", 0.5)
+        now[0] = 5.1
     err = capsys.readouterr().err.replace("\r\x1b[K", "\n").splitlines()
     stages = ["deriving 7_3_3: 0 %", "compiling (0 of 2 files): 25 %", "compiling (1 of 2 files): 50 %, 4 s left"]
     assert err[1:4] == stages
