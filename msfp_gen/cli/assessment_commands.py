@@ -168,7 +168,8 @@ def _bound_suite(
     if output is not None:
         make_folder(output, "--output")
     build(study.scene(1))
-    with kept(output), Progress(f"{len(study.inputs.records)} records at their bounds") as update:
+    count = len(study.inputs.records) - len(set(leave_out))
+    with kept(output), Progress(f"{count} record{'s' * (count > 1)} at their bounds") as update:
         bounds = module.bound_suite(study, output, leave_out=leave_out, workers=workers, progress=update)
     answer(bounds.as_dict(), module.suite_bound_tables(bounds), as_json)
     if output is not None:
