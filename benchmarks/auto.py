@@ -31,7 +31,7 @@ from msfp_gen.scene.file.loader import scene_from_table
 ROWS = 4000
 TOLERANCE = 1e-6
 PROMISED = 0.005
-LIMIT = 30.0  # [s] of wall time of one run
+LIMIT = 30.0  # [s] of the processor, of one run
 SEED, COUNT = 21, pick(50, 2)
 TUTORIAL = Path(__file__).resolve().parents[1] / "docs" / "tutorial.md"
 COLUMNS = "force, RMS | peak force | displacement | sliding | least gap"

@@ -32,6 +32,7 @@ def require_memory(scenes: Sequence[Scene]) -> None:
     """
     counted = [scene for scene in scenes if _row_step(scene) < math.inf]
     needed = sum(map(_needed, counted))
+    _of_variable()  # a wrong one is refused, however few rows there are
     if needed <= SMALL or needed <= (room := available()):
         return
     worst = max(counted, key=_needed)
@@ -119,6 +120,7 @@ def _of_process() -> float:
 
 
 def _of_variable() -> float:
+    """Memory that MSFP_GEN_MEMORY leaves [bytes]; infinite without it. Raises InputError where it is no number."""
     text = os.environ.get(VARIABLE, "").strip()
     if not text:
         return math.inf

@@ -147,6 +147,8 @@ def test_a_limit_of_the_user(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv(memory.VARIABLE, text)
         with pytest.raises(InputError, match=f"MSFP_GEN_MEMORY = '{text}': give the memory"):
             memory.available()
+        with pytest.raises(InputError, match="MSFP_GEN_MEMORY"):  # where nothing is needed too
+            memory.require_memory([])
 
 
 def test_no_memory_left_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
