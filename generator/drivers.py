@@ -214,6 +214,25 @@ def check_by_ends(equations: Equations, kernels: Mapping[str, Kernel]) -> None:
     check(passes, programs, equations.blocks, ends.moving(equations.blocks), "by_ends")
 
 
+PLACES = {Over.BASE: "base", Over.BODIES: "body", Over.TOP: "top"}
+
+
+def operations(equations: Equations) -> dict[str, dict[str, int]]:
+    """Arithmetic operations of one evaluation without derivatives: form -> (base, body, surface, top) -> number.
+
+    Of programs of which one acts the longest counts, of what the runtime solves one iteration.
+    """
+    effects, programs = equations.spec.effects, {program.name: program for program in equations.programs}
+    counts: dict[str, dict[str, int]] = {}
+    for form, schedule in (("momentum balances", momentum_balances(effects)), ("condensed", condensed(effects))):
+        of = counts[form] = dict.fromkeys(("base", "body", "surface", "top"), 0)
+        for one in passes_of(schedule):
+            for call in one.calls:
+                longest = max(lower(programs[name]).operations for name in call.programs)
+                of[PLACES.get(one.over, "surface")] += longest
+    return counts
+
+
 def _called(schedule: Schedule) -> dict[str, Call]:
     """The programs that a schedule calls in emitted C, each with one of its calls."""
     return {name: call for call in _emitted(schedule) for name in call.programs}

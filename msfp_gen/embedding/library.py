@@ -312,6 +312,9 @@ def write_guide(spec: ModelSpec, folder: Path, module: str) -> Path:
 
 
 def _guide_content(spec: ModelSpec, folder: Path, module: str) -> dict[str, Any]:
+    from msfp_gen.generator.derive import derive
+    from msfp_gen.generator.drivers import operations
+
     return {
         "stamp": f"{STAMP} {__version__} for {spec.key}",
         "spec": spec,
@@ -319,6 +322,7 @@ def _guide_content(spec: ModelSpec, folder: Path, module: str) -> dict[str, Any]
         "module": module,
         "derived": sorted({path.name for path in (folder / "derived").glob("*")} - {f"{module}.h"}),
         "runtime": sorted(path.name for path in (folder / "runtime").glob("*") if path.name not in WRAPPER),
+        "operations": operations(derive(spec)),
         "example": values.example(spec),
         "planar": spec.effects.dimension == "planar",
         "body": contract.BODY,
