@@ -220,7 +220,8 @@ def extreme_entries(spec: ModelSpec) -> Iterator[str]:
         vector = extreme.shape == (4,)
         field = None if extreme.of == contract.ACROSS else fields_of[extreme.of]
         pair = field is not None and field.shape[1:] == (2,)
-        count, how = ("4", "VECTOR") if vector else ("MSFP_NB", "LENGTH" if pair else "NUMBER")
+        one = "OPENING" if extreme.opening else "LENGTH" if pair else "NUMBER"
+        count, how = ("4", "VECTOR") if vector else ("MSFP_NB", one)
         of = "MSFP_ACROSS" if field is None else f"MSFP_ROW_{extreme.of.upper()}"
         flags = ", ".join(str(int(flag)) for flag in (extreme.least, extreme.positions, extreme.loaded))
         yield f"{count}, {of}, MSFP_{how}, {flags}"

@@ -125,7 +125,7 @@ def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -
     return BuildingScene(building, bearings, motions[0], solver, duration, name, step, limits, fidelity)
 
 
-EXTREMES = "extremes"  # group
+EXTREMES, EXTREME_TIMES = "extremes", "extreme_times"  # groups
 STEPS = "steps"  # group with the accelerations of all nodes at the ends of all steps
 OF_STEPS = {"time": ("step",), "acceleration": ("step", "node", "freedom")}
 FREEDOM = ("u1", "u2", "u3", "r1", "r2", "r3")
@@ -266,14 +266,16 @@ def columns(scene: BuildingScene) -> Places:
 
 
 def groups_of(result: Any) -> dict[str, xr.Dataset]:
-    """The groups of a file beside the dataset: matrices, motions of the ground, extremes."""
+    """The groups of a file beside the dataset: matrices, motions of the ground, extremes and their times."""
     groups = {GROUP: _group_of(to_arrays(result.scene.building), MATRICES)}
     groups |= {ground_name(i): to_pieces(motion) for i, motion in enumerate(result.scene.grounds[0])}
     groups |= {STEPS: _group_of(result.steps._asdict(), OF_STEPS)}
-    return groups | {EXTREMES: _group_of(vars(result.extremes), DIMENSIONS)}
+    extremes = {name: getattr(result.extremes, name) for name in DIMENSIONS}
+    groups |= {EXTREMES: _group_of(extremes, DIMENSIONS)}
+    return groups | {EXTREME_TIMES: _group_of(result.extremes.times, DIMENSIONS)}
 
 
-def _group_of(arrays: Arrays, dims: Dimensions) -> xr.Dataset:
+def _group_of(arrays: Mapping[str, Array], dims: Dimensions) -> xr.Dataset:
     import xarray as xr
 
     return xr.Dataset({name: (dims[name], values) for name, values in arrays.items()})
@@ -307,7 +309,10 @@ def fields_in(root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, An
         "wall_time": counters.pop("wall_time"),
         "counters": counters,
         "monitored": notes_in(about),
-        "extremes": BuildingExtremes(**_arrays_in(root, EXTREMES, DIMENSIONS, sizes)),
+        "extremes": BuildingExtremes(
+            **_arrays_in(root, EXTREMES, DIMENSIONS, sizes),
+            times=_arrays_in(root, EXTREME_TIMES, DIMENSIONS, sizes),
+        ),
     }
 
 

@@ -5,7 +5,7 @@ The scene gives the vectors of which the compiled run keeps peaks; its numbers b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, get_type_hints
 
@@ -19,7 +19,6 @@ from msfp_gen.scene.friction_parameters import start_temperatures
 Shapes = list[tuple[str, tuple[int, ...]]]  # names and shapes of consecutive numbers
 CORNERS = 4  # of the plan
 OF_SURFACES = ("sliding", "rim_force", "lift", "temperature")  # quantities of surfaces whose largest value is kept
-CONTACT = ("contact_offset", "contact_time")  # quantities of surfaces that rows do not have
 VECTOR = 4  # numbers for a vector: largest magnitudes along E1, E2, E3 and in the horizontal plane
 # Dimension -> size, where it is equal in all buildings.
 SIZES = {"peak": VECTOR, "whole": 1, "kind": 2, "end": 2, "order": 3}
@@ -51,7 +50,10 @@ class BuildingExtremes:
 
     Largest value, shape (bearings, surfaces): sliding [m], rim_force [N], lift, the clearance between separated faces
     [m], temperature [degC], and, in models without uplift, contact_offset of a loaded contact from the axis of its
-    slider [m], at contact_time [s]. Bearings with fewer surfaces than another have zeros in place of the missing ones.
+    slider [m]. Bearings with fewer surfaces than another have zeros in place of the missing ones. rims_met, shape
+    (bearings,): the largest number of rims that are met at one time.
+
+    times: name of each -> when every number was reached first [s], in its shape.
     """
 
     node_acceleration: OfNodes
@@ -76,12 +78,16 @@ class BuildingExtremes:
     lift: OfSurfaces
     temperature: OfSurfaces
     contact_offset: OfSurfaces
-    contact_time: OfSurfaces
     normal_force: Annotated[Array, ("bearing", "end", "surface")]
+    rims_met: Annotated[Array, ("bearing",)]
+    times: Mapping[str, Array]
 
     @classmethod
     def of_run(cls, scene: BuildingScene, recorded: Array, kept: Sequence[Shapes]) -> BuildingExtremes:
-        """Extremes from the numbers of a compiled run (`msfp_building.h`). kept: names and shapes for each bearing."""
+        """Extremes from the numbers of a compiled run and their times (`msfp_building.h`), shape (2, peaks).
+
+        kept: names and shapes for each bearing.
+        """
         nodes, storeys = len(scene.building.nodes), len(scene.building.columns)
         floors = np.array([node.floor for node in scene.building.nodes], dtype=bool)
         vectors = {
@@ -103,47 +109,57 @@ class BuildingExtremes:
         for i, numbers in enumerate(kept):
             shapes += [(f"displacement {i}", (VECTOR,)), (f"force {i}", (VECTOR,)), (f"axial {i}", (2,))]
             shapes += [(f"{word} {name} {i}", shape) for word in ("least", "most") for name, shape in numbers]
-            shapes.append((f"contact {i}", (scene.bearings[i].bearing.layout.surfaces, 2)))
-        values = parts(recorded, shapes)
+            shapes += [(f"contact {i}", (scene.bearings[i].bearing.layout.surfaces,)), (f"met {i}", (1,))]
+        values, times = (parts(each, shapes) for each in recorded)
+        for i, bearing in enumerate(scene.every_bearing):
+            values[f"contact {i}"] = values[f"contact {i}"] * bearing.arrays()["radius"]
+            values[f"least compression {i}"] = lift_of(values[f"least compression {i}"])
+            values[f"most temperature {i}"] = temperature_of(bearing, values[f"most temperature {i}"])
 
-        def of_bearings(name: str) -> list[Array]:
-            return [values[f"{name} {i}"] for i in range(len(kept))]
-
-        def of_corners(name: str) -> Array:
-            found: Array = values[f"node_{name}"].copy()
-            found[floors] = values[f"floor_{name}"].reshape(-1, CORNERS, VECTOR).max(axis=1)
+        def of_corners(name: str, of: dict[str, Array]) -> Array:
+            """Of the corners of each floor the largest value, or its time, shape (floors, 4)."""
+            size, each = values[name].reshape(-1, CORNERS, VECTOR), of[name].reshape(-1, CORNERS, VECTOR)
+            found: Array = np.take_along_axis(each, size.argmax(axis=1)[:, None], axis=1)[:, 0]
             return found
 
-        radii = [bearing.arrays()["radius"] for bearing in scene.every_bearing]
-        return cls(
-            **{name: values[name] for name in list(vectors)[:4]},
-            storey_torsion=values["torsion"][:, 2],
-            base_twist=values["twist"][:, 2],
-            corner_acceleration=of_corners("acceleration"),
-            corner_displacement=of_corners("displacement"),
-            corner_drift=values["corner"].reshape(storeys, CORNERS, VECTOR).max(axis=1),
-            mean_displacement=values["mean"][0],
-            overturning_moment=values["overturning"][0],
-            base_reaction=values["base"][0],
-            base_torsion=values["base_torsion"],
-            energy=values["energy"],
-            bearing_displacement=np.array(of_bearings("displacement")),
-            top_force=np.array(of_bearings("force")),
-            axial_force=np.array(of_bearings("axial")),
-            sliding=padded(of_bearings("most sliding")),
-            rim_force=padded(of_bearings("most rim")),
-            lift=padded([lift_of(values) for values in of_bearings("least compression")]),
-            contact_offset=padded(
-                [r * contact[:, 0] for r, contact in zip(radii, of_bearings("contact"), strict=True)]
-            ),
-            contact_time=padded([contact[:, 1] for contact in of_bearings("contact")]),
-            temperature=padded(list(map(temperature_of, scene.every_bearing, of_bearings("most temperature")))),
-            normal_force=np.stack([padded(of_bearings(f"{word} normal")) for word in ("least", "most")], axis=1),
-        )
+        def arranged(of: dict[str, Array]) -> dict[str, Array]:
+            def of_bearings(name: str) -> list[Array]:
+                return [of[f"{name} {i}"] for i in range(len(kept))]
+
+            corners = {}
+            for name in ("acceleration", "displacement"):
+                corners[f"corner_{name}"] = of[f"node_{name}"].copy()
+                corners[f"corner_{name}"][floors] = of_corners(f"floor_{name}", of)
+            return {
+                **{name: of[name] for name in list(vectors)[:4]},
+                **corners,
+                "corner_drift": of_corners("corner", of),
+                "storey_torsion": of["torsion"][:, 2],
+                "base_twist": of["twist"][:, 2],
+                "mean_displacement": of["mean"][0],
+                "overturning_moment": of["overturning"][0],
+                "base_reaction": of["base"][0],
+                "base_torsion": of["base_torsion"],
+                "energy": of["energy"],
+                "bearing_displacement": np.array(of_bearings("displacement")),
+                "top_force": np.array(of_bearings("force")),
+                "axial_force": np.array(of_bearings("axial")),
+                "sliding": padded(of_bearings("most sliding")),
+                "rim_force": padded(of_bearings("most rim")),
+                "lift": padded(of_bearings("least compression")),
+                "contact_offset": padded(of_bearings("contact")),
+                "temperature": padded(of_bearings("most temperature")),
+                "normal_force": np.stack([padded(of_bearings(f"{word} normal")) for word in ("least", "most")], axis=1),
+                "rims_met": np.concatenate(of_bearings("met")),
+            }
+
+        return cls(**arranged(values), times=arranged(times))
 
 
 DIMENSIONS = {
-    name: hint.__metadata__[0] for name, hint in get_type_hints(BuildingExtremes, include_extras=True).items()
+    name: hint.__metadata__[0]
+    for name, hint in get_type_hints(BuildingExtremes, include_extras=True).items()
+    if name != "times"
 }
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.buildings import dataset as building_dataset
 from msfp_gen.buildings import summary as summaries
-from msfp_gen.buildings.extremes import CONTACT, OF_SURFACES, BuildingExtremes, corners, heated, overturning
+from msfp_gen.buildings.extremes import OF_SURFACES, BuildingExtremes, corners, heated, overturning
 from msfp_gen.buildings.notes import notes_of
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.spectra import FloorSpectra, Steps, floor_spectra
@@ -258,11 +258,12 @@ class BuildingResult(AnyResult):
     @property
     def floors(self) -> list[dict[str, Any]]:
         """Peaks of every node, as in the summary."""
+        extremes = self.extremes
         peaks = {
-            "peak_acceleration": self.extremes.node_acceleration,
-            "peak_displacement": self.extremes.node_displacement,
-            "peak_corner_acceleration": self.extremes.corner_acceleration,
-            "peak_corner_displacement": self.extremes.corner_displacement,
+            "peak_acceleration": "node_acceleration",
+            "peak_displacement": "node_displacement",
+            "peak_corner_acceleration": "corner_acceleration",
+            "peak_corner_displacement": "corner_displacement",
         }
         return [
             {
@@ -270,7 +271,8 @@ class BuildingResult(AnyResult):
                 "height": float(node.position[2]),
                 "place": node.position[:2].tolist(),
                 "floor": node.floor,
-                **{name: by_axis(values[index]) for name, values in peaks.items()},
+                **{key: by_axis(getattr(extremes, name)[index]) for key, name in peaks.items()},
+                "times": {key: by_axis(extremes.times[name][index]) for key, name in peaks.items()},
             }
             for index, node in enumerate(self.scene.building.nodes)
         ]
@@ -300,6 +302,12 @@ class BuildingResult(AnyResult):
                     "peak_corner_drift_ratio": corner["radial"] / height,
                     "peak_shear": by_axis(extremes.storey_shear[index]),
                     "peak_torsion": float(extremes.storey_torsion[index]),
+                    "times": {
+                        "peak_drift": by_axis(extremes.times["drift"][index]),
+                        "peak_corner_drift": by_axis(extremes.times["corner_drift"][index]),
+                        "peak_shear": by_axis(extremes.times["storey_shear"][index]),
+                        "peak_torsion": float(extremes.times["storey_torsion"][index]),
+                    },
                 }
             )
         return rows
@@ -311,7 +319,11 @@ class BuildingResult(AnyResult):
         return [
             time_row(s),
             ("bearings", f"{len(self.bearings)}, peak displacement {1e3 * displacement['radial']:.4g} mm"),
-            ("base shear", f"{1e-6 * force['radial']:.4g} MN ({s['peak_force_ratio']:.3f} of the weight)"),
+            (
+                "base shear",
+                f"{1e-6 * force['radial']:.4g} MN ({s['peak_force_ratio']:.3f} of the weight) "
+                f"at {s['times']['peak_force']['radial']:.4g} s",
+            ),
             *summaries.floor_rows(s),
             ("N over N at rest", ratios_text(s)),
             ("rims met", summaries.rims_text(s["bearings"])),
@@ -399,19 +411,26 @@ def bearing_result(building: BuildingResult, index: int) -> Result:
 
 
 def _extremes(building: BuildingResult, index: int) -> Extremes:
-    """Extremes of a bearing over all steps."""
-    peaks, bearing = building.extremes, building.scene.bearings[index].bearing
+    """Extremes of a bearing over all steps, and their times; the gap is least with the largest sliding."""
+    bearing = building.scene.bearings[index].bearing
     own = (index, slice(bearing.layout.surfaces))
-    least, most = peaks.normal_force[index, :, own[1]]
-    rows = {name: getattr(peaks, name)[own] for name in (*OF_SURFACES, *CONTACT)}
-    return Extremes(
-        displacement=peaks.bearing_displacement[index],
-        top_force=peaks.top_force[index],
-        gap=bearing.arrays()["capacity"] - peaks.sliding[own],
-        least_normal=least,
-        most_normal=most,
-        **rows | {"temperature": heated(bearing, rows["temperature"])},
-    )
+
+    def of_bearing(of: Mapping[str, Any]) -> dict[str, Any]:
+        least, most = of["normal_force"][index, :, own[1]]
+        return {
+            "displacement": of["bearing_displacement"][index],
+            "top_force": of["top_force"][index],
+            "gap": of["sliding"][own],
+            "least_normal": least,
+            "most_normal": most,
+            "rims_met": of["rims_met"][index : index + 1],
+            **{name: of[name][own] for name in (*OF_SURFACES, "contact_offset")},
+        }
+
+    values, times = of_bearing(vars(building.extremes)), of_bearing(building.extremes.times)
+    values["gap"] = bearing.arrays()["capacity"] - values["gap"]
+    values["temperature"] = heated(bearing, values["temperature"])
+    return Extremes(**values, times=times)
 
 
 def _mounting(building: BuildingResult, index: int) -> Mounting:

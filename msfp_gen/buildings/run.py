@@ -117,10 +117,13 @@ class Member:
 
     @property
     def faces(self) -> list[int]:
-        """Places of the contacts in the row of its model, as MSFP_FACES of msfp_building.h; not checked with uplift."""
+        """Places of contacts and rims in the row of its model, as MSFP_FACES of msfp_building.h."""
         layout, indices = self.rest.bearing.layout, self._indices
-        places = [int(indices[name].flat[0]) for name in ("normal", "angles", "q")]
-        return [not self.effects.uplift, layout.surfaces, layout.m, *places, indices["q"].shape[1]]
+        normal, angles, tilts, gap, rim = (
+            int(indices[name].flat[0]) for name in ("normal", "angles", "q", "gap", "rim")
+        )
+        stride = indices["q"].shape[1]
+        return [not self.effects.uplift, layout.surfaces, layout.m, normal, angles, tilts, stride, gap, rim]
 
     @property
     def work(self) -> Array:
@@ -160,7 +163,7 @@ class CompiledRun(AnyRun, Protocol):
 
     @property
     def peaks(self) -> Array:
-        """Peaks over all steps, one number after the other, shape (peaks,) [SI]."""
+        """Peaks over all steps [SI] and when each was reached [s], one number after the other, shape (2, peaks)."""
 
     def ends(self, bearing: int) -> Array:
         """Motion of the ends of a bearing, from 0, at the present state, shape (2, 3, 6) [SI]."""

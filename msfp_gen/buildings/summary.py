@@ -34,6 +34,14 @@ def summarise(result: Any) -> dict[str, Any]:
             key: value for key, value in by_axis(extremes.overturning_moment).items() if key != "E3"
         },
         "peak_twist": float(extremes.base_twist[0]),
+        "times": {
+            "peak_force": by_axis(extremes.times["base_reaction"]),
+            "peak_base_torsion": float(extremes.times["base_torsion"][0]),
+            "peak_overturning_moment": {
+                key: value for key, value in by_axis(extremes.times["overturning_moment"]).items() if key != "E3"
+            },
+            "peak_twist": float(extremes.times["base_twist"][0]),
+        },
         "minimum_load_ratio": min(bearing["minimum_load_ratio"] for bearing in bearings),
         "maximum_load_ratio": max(bearing["maximum_load_ratio"] for bearing in bearings),
         "rims_met": [bearing["number"] for bearing in bearings if bearing["rims_met"]],

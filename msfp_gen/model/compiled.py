@@ -120,12 +120,12 @@ class Run(AnyRun, Protocol):
         """Name, surface (from 1, 0: none) and value."""
 
     @property
-    def trips(self) -> dict[str, tuple[float, int, float]]:
-        """Monitors that tripped: name -> time, surface, value."""
+    def trips(self) -> dict[str, tuple[float, int, float, float]]:
+        """Monitors that tripped: name -> time, surface, value, time of the value."""
 
     @property
     def extremes(self) -> Array:
-        """Extremes over all accepted steps, one number after the other, shape (extremes size,) [SI]."""
+        """Extremes over all accepted steps [SI] and their times [s], one number after the other, shape (2, size)."""
 
     @property
     def events(self) -> list[EventRow]:
@@ -199,8 +199,8 @@ class Port(Protocol):
         """Return to the state of a snapshot. Raises ValueError."""
 
     @property
-    def trips(self) -> dict[str, tuple[float, int, float]]:
-        """First detections of the monitors in steps by stages: name -> (time, surface, value)."""
+    def trips(self) -> dict[str, tuple[float, int, float, float]]:
+        """Detections of the monitors in steps by stages: name -> (time, surface, value, time of the value)."""
 
     def state(self) -> dict[str, Any]:
         """The committed state, as `RestartState` has it."""

@@ -36,6 +36,7 @@ from msfp_gen.results.history import (
     History,
     quantities,
 )
+from msfp_gen.results.note import Note
 from msfp_gen.results.stored_group import Attribute, StoredGroup
 from msfp_gen.results.variables import (
     Arrays,
@@ -152,7 +153,8 @@ def _attributes_below(one: Result, mounting: Mounting) -> dict[str, str | int | 
 
 def edition() -> str:
     """A digest of the names that a file of this version has: of variables, counters and labels."""
-    return digest_of_names([*VARIABLES, *LABELS.items(), [field.name for field in fields(Counters)], WORDS])
+    classes = (Counters, Extremes, Note)
+    return digest_of_names([*VARIABLES, *LABELS.items(), *([f.name for f in fields(one)] for one in classes), WORDS])
 
 
 def fields_in(root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, Any]:
@@ -165,18 +167,19 @@ def fields_in(root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, An
     read = stored_fields(root, variables, sizes)
     energy = {name: read.pop(f"energy_{name}") for name in ENERGY}
     history = History(**{field: read[field] for field in quantities() if field in read}, energy=energy)
+    recorded = _extremes(json.loads(str(about["extremes"])), surfaces) if "extremes" in about else None
     return {
         "scene": scene,
         "history": history,
         "events": _events(read, surfaces),
-        "gradients": _gradients(root, history, sizes),
+        "gradients": _gradients(root, recorded, sizes),
         "counters": Counters(**without(COUNTER, about)),  # type: ignore[arg-type]
         "notes": notes_in(about),
-        "recorded_extremes": _extremes(json.loads(str(about["extremes"])), surfaces) if "extremes" in about else None,
+        "recorded_extremes": recorded,
     }
 
 
-def _gradients(root: StoredGroup, history: History, sizes: dict[str, int]) -> Gradients | None:
+def _gradients(root: StoredGroup, recorded: Extremes | None, sizes: dict[str, int]) -> Gradients | None:
     """The derivatives with respect to parameters, where the file has some."""
     if GRADIENT not in root:
         return None
@@ -198,7 +201,7 @@ def _gradients(root: StoredGroup, history: History, sizes: dict[str, int]) -> Gr
         return Gradients(parameters, read, extremes, error)
 
     derivatives = gradients(error=gradients(ERROR) if f"extremes{ERROR}" in attributes else None)
-    needed = {field for field, _ in SERIES.values() if getattr(history, field) is not None}
+    needed = {field for name, (field, _) in SERIES.items() if getattr(recorded, name, None) is not None}
     if missing := sorted(needed - derivatives.arrays.keys()):
         raise ValueError(f"the gradient has no {missing[0]}")
     return derivatives
@@ -238,12 +241,14 @@ def _events(read: Arrays, surfaces: int) -> tuple[Event, ...]:
     return tuple(Event(float(t), int(s), kind, u, force) for t, s, kind, u, force in rows)
 
 
-def _extremes(table: dict[str, list[float]], surfaces: int) -> Extremes:
-    """Extremes of all steps; the numbers are finite."""
+def _extremes(table: dict[str, Any], surfaces: int) -> Extremes:
+    """Extremes of all steps and their times; the numbers are finite."""
     extremes = Extremes.of_table(table)
-    for name, values in extremes.table.items():
-        shape = np.shape(values)
-        if shape != ((4,) if name in ("displacement", "top_force") else (surfaces,)) or not np.isfinite(values).all():
+    if extremes.times.keys() != extremes.arrays.keys():
+        raise ValueError("extremes: times are not those of the values")
+    for name, values in (*extremes.arrays.items(), *extremes.times.items()):
+        shape = (4,) if name in ("displacement", "top_force") else (surfaces,)
+        if values.shape != shape or not np.isfinite(values).all():
             raise ValueError(f"extremes: {name} is no list of finite numbers of the right length")
     return extremes
 

@@ -7,7 +7,7 @@ here and the dataset in `dataset.py` are based on them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Annotated, Any, ClassVar, Literal, get_origin, get_type_hints
 
@@ -245,12 +245,14 @@ SERIES = {
     "top_force": ("top_force", "axes"),
     "sliding": ("sliding", ""),
     "gap": ("gap", ""),
+    "rim_force": ("rim_force", ""),
     "slip_speed": ("slip_velocity", "length"),
     "least_normal": ("normal_force", ""),
     "most_normal": ("normal_force", ""),
     "temperature": ("temperature", ""),
     "least_friction": ("friction_coefficient", ""),
     "most_friction": ("friction_coefficient", ""),
+    "lift": ("lift", ""),
 }
 
 
@@ -273,9 +275,11 @@ class Extremes:
     displacement [m], top_force [N]: largest magnitude along E1, E2, E3 and in the horizontal plane, shape (4,).
     Per surface, shape (n-1,): sliding, the largest, and gap, the least [m]; least_normal, most_normal [N]; slip_speed,
     the largest, while the surface is closed [m/s], None of a bearing of a building; least_friction, most_friction,
-    where a friction law acts; temperature, the highest, where it heats [degC]; rim_force [N] and lift [m], the largest,
-    which a bearing that is not below a building records in rows alone; contact_offset, the distance of a loaded contact
-    from the axis of its slider [m], and contact_time [s], of a bearing of a building alone.
+    where a friction law acts; temperature, the highest, where it heats [degC]; rim_force [N] and lift [m], the largest.
+    Of a bearing of a building alone: contact_offset, the distance of a loaded contact from the axis of its slider [m],
+    and rims_met, the number of surfaces whose rims are met at one time, shape (1,).
+
+    times: name of each -> when every number was reached first [s], in its shape; empty of derivatives.
     """
 
     displacement: Array
@@ -291,57 +295,70 @@ class Extremes:
     rim_force: Array | None = None
     lift: Array | None = None
     contact_offset: Array | None = None
-    contact_time: Array | None = None
+    rims_met: Array | None = None
+    times: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of_rows(cls, history: History) -> Extremes:
         """Extremes of the rows alone."""
-        extremes: dict[str, Any] = {}
+        extremes, times = dict[str, Any](), dict[str, Array]()
         for name in SERIES:
             if (values := series(name, history)) is not None:
-                extremes[name] = values.min(axis=0) if name in LEAST else values.max(axis=0)
-        return cls(**extremes, rim_force=history.rim_force.max(axis=0), lift=history.lift.max(axis=0))
+                rows = (values.argmin if name in LEAST else values.argmax)(axis=0)
+                extremes[name] = values[rows, np.arange(len(rows))]
+                times[name] = history.time[rows]
+        return cls(**extremes, times=times)
 
     @classmethod
     def of_run(cls, numbers: Sequence[tuple[str, tuple[int, ...]]], recorded: Array, azimuth: float) -> Extremes:
-        """Extremes that a compiled run recorded.
+        """Extremes that a compiled run recorded, or their derivatives.
 
-        numbers: name and shape of each, `EXTREMES` of the extension. recorded: one after the other. azimuth: of the
-        frame of a planar model [rad], in which all horizontal vectors are along E1.
+        numbers: name and shape of each, `EXTREMES` of the extension. recorded: one after the other, and their times,
+        shape (2, size); derivatives without times, shape (size,). azimuth: of the frame of a planar model [rad], in
+        which all horizontal vectors are along E1.
         """
-        extremes = {name: values.ravel() for name, values in parts(recorded, numbers).items()}
+        extremes, *times = (
+            {name: values.ravel() for name, values in parts(each, numbers).items()} for each in np.atleast_2d(recorded)
+        )
         if azimuth:
             for name in ("displacement", "top_force"):
                 along, _, vertical, radial = extremes[name]
                 extremes[name] = np.array(
                     [along * abs(np.cos(azimuth)), along * abs(np.sin(azimuth)), vertical, radial]
                 )
-        return cls(**extremes)
+                for each in times:
+                    each[name] = each[name][[0, 0, 2, 3]]
+        return cls(**extremes, times=times[0] if times else {})
 
     @classmethod
     def of_table(cls, table: dict[str, Any]) -> Extremes:
         """The inverse of `table`."""
-        return cls(**{name: np.array(values, dtype=float) for name, values in table.items()})
+        values: dict[str, Any] = {name: np.array(each, dtype=float) for name, each in table.items() if name != "times"}
+        times = {name: np.array(each, dtype=float) for name, each in table.get("times", {}).items()}
+        return cls(**values, times=times)
 
     @property
-    def table(self) -> dict[str, list[float]]:
+    def table(self) -> dict[str, Any]:
         """As plain data; what was not recorded is left out."""
-        return {name: value.tolist() for name, value in self.arrays.items()}
+        values: dict[str, Any] = {name: value.tolist() for name, value in self.arrays.items()}
+        times = {name: value.tolist() for name, value in self.times.items()}
+        return values | ({"times": times} if times else {})
 
     @property
     def arrays(self) -> dict[str, Array]:
-        """What was recorded, by name; see `Extremes` for shapes and units."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        """What was recorded, by name, without its times; see `Extremes` for shapes and units."""
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "times"}
         return {name: value for name, value in values.items() if value is not None}
 
     def __or__(self, other: Extremes) -> Extremes:
-        """Extremes of both."""
-        extremes: dict[str, Any] = {}
-        for name in (f.name for f in fields(self)):
-            one, two = getattr(self, name), getattr(other, name)
-            known = [value for value in (one, two) if value is not None]
-            extremes[name] = (np.min if name in LEAST else np.max)(known, axis=0) if known else None
-        return Extremes(**extremes)
+        """Extremes of both; where they are equal the earlier time counts."""
+        extremes, times = other.arrays | self.arrays, dict(other.times) | dict(self.times)
+        for name in self.arrays.keys() & other.arrays.keys():
+            one, two, at, later = self.arrays[name], other.arrays[name], self.times[name], other.times[name]
+            beyond = two < one if name in LEAST else two > one
+            extremes[name] = np.where(beyond, two, one)
+            times[name] = np.where(beyond | ((two == one) & (later < at)), later, at)
+        return Extremes(**extremes, times=times)
 
 
 def by_axis(magnitudes: Array) -> dict[str, float]:

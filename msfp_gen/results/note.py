@@ -21,7 +21,7 @@ class Note:
     inertial over normal force [-], temperature rise [K], slip velocity [m/s], temperature [degC], share of the energy
     or the force [-], movement [m], distance of the normal force from the axis [m], number of landings, error over the
     derivative [-], value of the scene. action: the effects with which the run continued; "": it continued unchanged, or
-    ended. bearing: of a building, from 1; 0: none.
+    ended. bearing: of a building, from 1; 0: none. value_time: of that value of a monitor [s], else None.
     """
 
     time: float
@@ -31,6 +31,7 @@ class Note:
     text: str
     action: str = ""
     bearing: int = 0
+    value_time: float | None = None
 
     @property
     def line(self) -> str:
@@ -104,16 +105,16 @@ def monitor_notes(ending: Ending, after: Effects | None) -> list[Note]:
     """
     trips, time, status = dict(ending.trips), ending.time, ending.status
     if after is not None and status == "ok":
-        trips["plane"] = (time, 0, 0.0)
+        trips["plane"] = (time, 0, 0.0, time)
     if after is not None and status == "uplift":
-        trips["uplift"] = (time, ending.surface, ending.value)
+        trips["uplift"] = (time, ending.surface, ending.value, time)
     if after is not None and status in JAM_STATUSES:
-        trips["jammed"] = (time, ending.surface, ending.value)
+        trips["jammed"] = (time, ending.surface, ending.value, time)
     notes = []
-    for kind, (tripped, surface, value) in sorted(trips.items(), key=lambda item: item[1][0]):
+    for kind, (tripped, surface, value, value_time) in sorted(trips.items(), key=lambda item: item[1][0]):
         action = ", ".join(_changes(kind, ending.effects, after))
         text = _text(kind, surface, value, status, went_on=tripped < time, alone=not action)
-        notes.append(Note(tripped, kind, surface, value, text, action))
+        notes.append(Note(tripped, kind, surface, value, text, action, value_time=value_time))
     return notes
 
 

@@ -247,6 +247,8 @@ OVER_STEPS = {
     ("peak", "sliding"): "sliding",
     ("most", "sliding"): "sliding",
     ("least", "gap"): "gap",
+    ("most", "rim_force"): "rim_force",
+    ("most", "lift"): "lift",
     ("least", "normal_force"): "least_normal",
     ("most", "normal_force"): "most_normal",
     ("least", "friction_coefficient"): "least_friction",

@@ -127,6 +127,8 @@ def summarise(result: Result) -> dict[str, Any]:
         uplift: of all surfaces together, see `uplift_of`.
         verdict: what the device was asked to bear, against its limits; see `Verdict.as_dict` and docs/limits.md.
         rims_met: surfaces (1..n-1) that reached their rim.
+        times: when each peak was reached first [s]: peak_displacement, peak_force and the keys of extremes of surfaces,
+            each in the shape of its values.
         energy: see `energy_balance`.
         counters: work of the solver.
         wall_time: [s].
@@ -176,6 +178,7 @@ OF_SURFACES = {
     "least_friction": "least_friction",
     "most_friction": "most_friction",
     "temperature": "peak_temperature",
+    "rim_force": "peak_rim_force",
 }
 
 
@@ -189,13 +192,18 @@ def summary_of_bearing(one: Result) -> dict[str, Any]:
         "peak_force": force,
         "axial_load": load,
         "peak_force_ratio": force["radial"] / load if load else None,
+        "times": {
+            "peak_displacement": by_axis(extremes.times["displacement"]),
+            "peak_force": by_axis(extremes.times["top_force"]),
+        },
     }
     if one.one_pendulum:
         return summary
+    times = {key: extremes.times[name].tolist() for name, key in OF_SURFACES.items() if recorded[key] is not None}
     summary |= {
+        "times": summary["times"] | times,
         **{key: values.tolist() for key, values in recorded.items() if values is not None},
         "capacity_used": (1.0 - extremes.gap / one.bearing.arrays()["capacity"]).tolist(),
-        "peak_rim_force": None if extremes.rim_force is None else extremes.rim_force.tolist(),
         "friction": [surface.friction for surface in one.bearing.surfaces],
         "friction_at_pivot": None if sheet is None else list(sheet),
         "uplift": uplift_of(one),
@@ -225,10 +233,11 @@ def rows_of_bearing(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     about = _place_row(summary) if below else time_row(summary)
     loads = [("N over N at rest", ratios_text(summary))] if below else []
     ratio = "" if summary["peak_force_ratio"] is None else f" ({summary['peak_force_ratio']:.3f} of the axial load)"
+    at = {key: f" at {times['radial']:.4g} s" for key, times in summary["times"].items() if isinstance(times, Mapping)}
     whole = [
         about,
-        ("peak displacement", _along(summary["peak_displacement"], 1e3, "mm")),
-        ("peak force", _along(summary["peak_force"], 1e-3, "kN") + ratio),
+        ("peak displacement", _along(summary["peak_displacement"], 1e3, "mm", at["peak_displacement"])),
+        ("peak force", _along(summary["peak_force"], 1e-3, "kN", at["peak_force"]) + ratio),
     ]
     if "peak_sliding" not in summary:  # of one pendulum in place of the stack
         return whole + loads
@@ -252,10 +261,10 @@ def ratios_text(summary: Mapping[str, Any], to: str = " to ") -> str:
     return f"{least:.2f}{' (lifts)' if least == 0 else ''}{to}{most:.2f}"
 
 
-def _along(peaks: Mapping[str, float], scale: float, unit: str) -> str:
-    """The peak in the horizontal plane, and those along its axes."""
+def _along(peaks: Mapping[str, float], scale: float, unit: str, at: str) -> str:
+    """The peak in the horizontal plane and its time, and the peaks along its axes."""
     radial, *axes = (f"{peaks[key] * scale:.4g}" for key in ("radial", "E1", "E2"))
-    return f"{radial} {unit}, along E1 {axes[0]}, E2 {axes[1]}"
+    return f"{radial} {unit}{at}, along E1 {axes[0]}, E2 {axes[1]}"
 
 
 def energy_balance(history: History) -> dict[str, float | None]:
@@ -289,8 +298,8 @@ WITHOUT = {
     "rims_met": "it is a list of surfaces, which jumps where another rim is met",
     "transitions": "they are read from rows",
     "counters": "they count the work of the solver",
+    "times": "they jump where another peak is the largest",
     "error": "errors are measured where a slider meets its rim",
-    "peak_rim_force": "it is read from rows, whose rim_force has derivatives",
     "energy": "its terms are integrals over the run, which simulate(..., energy_gradients=True) differentiates",
 }
 """Keys of the summary that have no derivative, or only where it was asked for, with the reason."""
@@ -308,10 +317,10 @@ def summarise_gradients(result: Result) -> dict[str, dict[str, Any]]:
     """Derivatives of the scalars of `summarise(result)` in SI units, by the path of the parameter.
 
     Keys: peak_displacement, peak_force, peak_force_ratio, peak_sliding, minimum_gap, minimum_normal_force,
-    maximum_normal_force and, with a friction law, least_friction, most_friction and peak_temperature, as in the
-    summary; and of runs with `energy_gradients` energy, those of the terms of `History.energy` at the end; where errors
-    were measured, error: that of each derivative, with the same keys. Raises InputError where the run computed no
-    derivatives, and for a key whose value jumps (`WITHOUT`).
+    maximum_normal_force, peak_rim_force and, with a friction law, least_friction, most_friction and peak_temperature,
+    as in the summary; and of runs with `energy_gradients` energy, those of the terms of `History.energy` at the end;
+    where errors were measured, error: that of each derivative, with the same keys. Raises InputError where the run
+    computed no derivatives, and for a key whose value jumps (`WITHOUT`).
     """
     gradients = gradients_of(result)
     recorded = result.recorded_extremes

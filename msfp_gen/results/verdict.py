@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 RIM_SHARE = 1 / 3  # rim force over the axial load, up to which the spring of a rim was compared
 COMPRESSION_SHARE = 0.1  # compression of a rim over the capacity of its surface
-IN_ROWS = 0.02  # share by which the largest value of the rows may miss one over all steps, of which it has the time
 ROUNDING = 1e-10  # of a value, relative
 OF_WHOLE = ("axial_load", "displacement")  # limits of a whole bearing, not of its surfaces
 NO_SURFACES = "the surfaces are not judged: the run has one pendulum in their place"
@@ -215,35 +214,22 @@ def verdict_of(
     return Verdict(tuple(readings), failure, stopped, whole)
 
 
-def _by_surface(one: Result, rows: Array, reached: Array, allowed: Array | float) -> Iterator[Value]:
-    """Values of every surface. rows: of the same quantity, shape (T, n-1)."""
-    allowed = np.broadcast_to(allowed, reached.shape)
-    for surface, (own, value, most) in enumerate(zip(rows.T, reached, allowed, strict=True), start=1):
-        yield Value(surface, _time_of(one, own, float(value)), float(value), float(most))
-
-
-def _time_of(one: Result, rows: Array, value: float) -> float | None:
-    """The time of the row with the largest value, shape (T,); None where the rows do not have what was reached."""
-    row = int(rows.argmax())
-    return float(one.history.time[row]) if rows[row] >= (1 - IN_ROWS) * value else None
+def _by_surface(one: Result, name: str, reached: Array, allowed: Array | float) -> Iterator[Value]:
+    """Values of every surface, reached when the extreme `name` was."""
+    for j, (value, most) in enumerate(zip(reached, np.broadcast_to(allowed, reached.shape), strict=True)):
+        yield Value(j + 1, float(one.extremes.times[name][j]), float(value), float(most))
 
 
 def _rim_force(one: Result, limits: Limits) -> Iterator[Value]:
-    """The larger of the force in the rows and that of the rim spring at its largest compression over all steps."""
-    bearing = one.bearing.arrays()
-    rows, reached = one.history.rim_force, np.asarray(one.extremes.rim_force)
-    if _rims_are_modelled(one):
-        reached = np.maximum(reached, bearing["rim_stiffness"] * np.maximum(0.0, -one.extremes.gap))
     load = float(one.extremes.most_normal.max()) if one.axial_load is None else one.axial_load
-    allowed = limits.rim_force or RIM_SHARE * load
-    return _by_surface(one, rows, reached, allowed)
+    yield from _by_surface(one, "rim_force", np.asarray(one.extremes.rim_force), limits.rim_force or RIM_SHARE * load)
 
 
 def _rim_compression(one: Result, limits: Limits) -> Iterable[Value]:
     if not _rims_are_modelled(one):
         return ()  # `beyond_rim` says so
     allowed = limits.rim_compression or COMPRESSION_SHARE * one.bearing.arrays()["capacity"]
-    return _by_surface(one, -one.history.gap, np.maximum(0.0, -one.extremes.gap), allowed)
+    return _by_surface(one, "gap", np.maximum(0.0, -one.extremes.gap), allowed)
 
 
 def _rims_are_modelled(one: Result) -> bool:
@@ -253,8 +239,11 @@ def _rims_are_modelled(one: Result) -> bool:
 
 def _travel(one: Result, limits: Limits) -> Iterator[Value]:
     """Rims in contact at one time; one surface must be left to slide."""
-    # By the contacts that the run has located, of a building by the rows.
+    # By the contacts that the run has located; a building counts them over all steps.
     allowed = float(len(one.extremes.gap) - 1)
+    if one.extremes.rims_met is not None:
+        yield Value(0, float(one.extremes.times["rims_met"][0]), float(one.extremes.rims_met[0]), allowed)
+        return
     closed = (one.history.gap <= 0) | (one.history.rim_force > 0)
     counts = closed.sum(axis=1)
     row = int(counts.argmax())
@@ -274,7 +263,7 @@ def _uplift_height(one: Result, limits: Limits) -> Iterator[Value]:
     bearing = one.bearing
     offsets = bearing.arrays()["rim_offset"][[bearing.slider(j) for j in range(len(bearing.surfaces))]]
     allowed = np.full(len(offsets), limits.uplift_height) if limits.uplift_height else offsets
-    for value in _by_surface(one, one.history.lift, np.asarray(one.extremes.lift), allowed):
+    for value in _by_surface(one, "lift", np.asarray(one.extremes.lift), allowed):
         if value.allowed > 0:  # without a rim_offset no height is known
             yield value
 
@@ -287,33 +276,27 @@ def _uplift_duration(one: Result, limits: Limits) -> Iterator[Value]:
 
 def _temperature(one: Result, limits: Limits) -> Iterator[Value]:
     """Temperatures of the friction law, or of the monitor of heat where the law has none."""
-    # The monitor does not keep when its largest rise was reached; the time of its note is that of the first one.
-    reached, rows = one.extremes.temperature, one.history.temperature
-    if reached is not None and rows is not None:
-        yield from _by_surface(one, rows, reached, limits.temperature)
+    if one.extremes.temperature is not None:
+        yield from _by_surface(one, "temperature", one.extremes.temperature, limits.temperature)
     for note in one.notes:
         if note.kind == "heat" and not note.action:
             start = float(start_temperatures(one.bearing)[note.surface - 1])
-            yield Value(note.surface, None, start + note.value, limits.temperature)
+            yield Value(note.surface, note.value_time, start + note.value, limits.temperature)
 
 
 def _of_bearing(one: Result, limits: Limits, name: str) -> Iterator[Value]:
     """The axial load or the displacement of a whole bearing, where a limit is given."""
-    history, extremes = one.history, one.extremes
-    rows, reached = {
-        "axial_load": (np.abs(history.top_force[:, 2]), extremes.top_force[2]),
-        "displacement": (history.horizontal, extremes.displacement[3]),
-    }[name]
+    extreme, component = {"axial_load": ("top_force", 2), "displacement": ("displacement", 3)}[name]
     if (allowed := getattr(limits, name)) is not None:
-        yield Value(0, _time_of(one, rows, float(reached)), float(reached), allowed)
+        values, times = getattr(one.extremes, extreme), one.extremes.times[extreme]
+        yield Value(0, float(times[component]), float(values[component]), allowed)
 
 
 def _beyond_rim(one: Result, limits: Limits) -> Iterator[Value]:
-    """The largest sliding beyond a capacity that the monitor of rims noted, and its row."""
+    """The largest sliding beyond a capacity that the monitor of rims noted."""
     for note in one.notes:
         if note.kind == "rims" and not note.action:
-            row = int(one.history.gap[:, note.surface - 1].argmin())
-            yield Value(note.surface, float(one.history.time[row]), note.value, 0.0)
+            yield Value(note.surface, note.value_time, note.value, 0.0)
 
 
 def _radius(bearing: Bearing, surface: int) -> float:
@@ -323,13 +306,14 @@ def _radius(bearing: Bearing, surface: int) -> float:
 
 def _face(one: Result, limits: Limits) -> Iterator[Value]:
     """Distances as a bearing of a building records them, or as the note of a bearing alone states them."""
-    offsets, times = one.extremes.contact_offset, one.extremes.contact_time
-    if offsets is None or times is None:
-        for note in one.notes:  # its time is that of its value
+    offsets = one.extremes.contact_offset
+    if offsets is None:
+        for note in one.notes:
             if note.kind == "footprint" and not note.action:
-                yield Value(note.surface, note.time, note.value, _radius(one.bearing, note.surface))
+                yield Value(note.surface, note.value_time, note.value, _radius(one.bearing, note.surface))
         return
-    for surface, (offset, time) in enumerate(zip(offsets.tolist(), times.tolist(), strict=True), start=1):
+    times = one.extremes.times["contact_offset"].tolist()
+    for surface, (offset, time) in enumerate(zip(offsets.tolist(), times, strict=True), start=1):
         if (radius := _radius(one.bearing, surface)) > 0:  # else no face is known
             yield Value(surface, time, offset, radius)
 

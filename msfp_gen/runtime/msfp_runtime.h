@@ -374,7 +374,8 @@ struct msfp_run {
     double h, previous_error, output_time; /* next step [s], error of the last one [-], time of the next row [s] */
     double start[3];                       /* r_01 - r_nn at the start [m] */
     double events_now[MSFP_EVENTS];        /* event functions at the present state */
-    msfp_extremes extremes;                /* over all accepted steps */
+    msfp_extremes extremes;                /* over all accepted steps, */
+    msfp_extremes extreme_times;           /* and when each of its numbers was reached [s] */
     double outward_rate;                   /* of the squared horizontal displacement, over 2, at the last step [m^2/s] */
 #if MSFP_CLOSED_FORM
     msfp_step_history step_history, next_step_history; /* of the step that led to `now`, and to `next` */

@@ -60,7 +60,7 @@ class Ending(NamedTuple):
     """How a run with one model ended, or a part of it.
 
     effects: of the model. status: name. time: reached [s]. surface, value: of the status; surface 0: none. trips: of
-    the monitors, name -> (time, surface, value).
+    the monitors, name -> (time of the first detection, surface, value, time of the value).
     """
 
     effects: Effects
@@ -68,7 +68,7 @@ class Ending(NamedTuple):
     time: float
     surface: int
     value: float
-    trips: Mapping[str, tuple[float, int, float]]
+    trips: Mapping[str, tuple[float, int, float, float]]
 
 
 def check(scene: Requested, effects: Effects) -> None:

@@ -393,13 +393,14 @@ class Extreme(Recorded):
     """Extremes of a field of the rows: of each surface, or of a vector, along E1, E2, E3 and in the horizontal plane.
 
     of: the field, or `ACROSS`. least: the least counts, otherwise the largest. positions: it follows from positions
-    alone. loaded: only surfaces that carry a normal force count.
+    alone. loaded: only surfaces that carry a normal force count. opening: of a compression how far it is below 0.
     """
 
     of: str = ""
     least: bool = False
     positions: bool = False
     loaded: bool = False
+    opening: bool = False
 
 
 _VECTOR = "largest magnitude along E1, E2, E3 and in the horizontal plane"
@@ -408,12 +409,22 @@ EXTREMES = (
     Extreme("top_force", (4,), "N", _VECTOR, of="top_force"),
     Extreme("sliding", (_N,), "m", "largest sliding displacement", of="sliding", positions=True),
     Extreme("gap", (_N,), "m", "least gap to the rim", of="gap", least=True, positions=True),
+    Extreme("rim_force", (_N,), "N", "largest rim force", of="rim"),
     Extreme("slip_speed", (_N,), "m/s", "largest slip velocity", of="slip", loaded=True),
     Extreme("least_normal", (_N,), "N", "least normal force", of="normal", least=True),
     Extreme("most_normal", (_N,), "N", "largest normal force", of="normal"),
     Extreme("least_friction", (_N,), "-", "least friction coefficient", "law", of="mu", least=True),
     Extreme("most_friction", (_N,), "-", "largest friction coefficient", "law", of="mu"),
     Extreme("temperature", (_N,), "degC", "highest temperature", "heat", of="temperature"),
+    Extreme(
+        "lift",
+        (_N,),
+        "m",
+        "largest clearance between the faces of a unilateral contact",
+        "uplift",
+        of="compression",
+        opening=True,
+    ),
 )
 
 

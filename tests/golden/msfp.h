@@ -224,9 +224,10 @@ typedef struct {
 
 /* What a monitor has detected. value: see enum msfp_monitor. */
 typedef struct {
-    double time;  /* of the first detection [s] */
-    double value; /* the one furthest beyond the limit until now, */
-    int surface;  /* and its surface, counted from 1; 0: nothing detected */
+    double time;       /* of the first detection [s] */
+    double value;      /* the one furthest beyond the limit until now, */
+    double value_time; /* when it was reached [s], */
+    int surface;       /* and its surface, counted from 1; 0: nothing detected */
 } msfp_trip;
 
 /* How a run stands. */
@@ -353,7 +354,8 @@ typedef struct msfp_api {
     void (*run_progress)(const msfp_run *run, msfp_progress *progress);
     void (*run_state)(const msfp_run *run, msfp_run_state *state);
     void (*run_counts)(const msfp_run *run, int64_t *counts);             /* [MSFP_COUNTS] */
-    void (*run_extremes)(const msfp_run *run, double *extremes);          /* [extremes_size] */
+    /* Extremes and the times at which each was reached [s], [extremes_size]; NULL: not given. */
+    void (*run_extremes)(const msfp_run *run, double *extremes, double *times);
     void (*run_trips)(const msfp_run *run, msfp_trip *trips);             /* [MSFP_MONITORS] */
     const msfp_event *(*run_events)(const msfp_run *run, size_t *count);  /* valid until the run is advanced */
     /* Rows [count][row_size] that the run holds, valid until it is advanced: all, or with a callback the last one. */

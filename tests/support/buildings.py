@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from msfp_gen import Auto, BaseSlab, Bearing, Building, Effects, Motion, Solver, Storey, Top, presets, simulate
-from msfp_gen.buildings.extremes import CONTACT, OF_SURFACES, BuildingExtremes, corner_points
+from msfp_gen.buildings.extremes import OF_SURFACES, BuildingExtremes, corner_points
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
 
@@ -121,6 +121,8 @@ def extremes_of_rows(result: BuildingResult) -> BuildingExtremes:
         top_force=largest(force),
         axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
         **most,
-        **dict.fromkeys(CONTACT, np.zeros_like(most["lift"])),
+        contact_offset=np.zeros_like(most["lift"]),
+        rims_met=(most["sliding"] >= np.array([one.arrays()["capacity"] for one in scene.every_bearing])).sum(axis=1),
+        times={},
         normal_force=np.stack([normal.min(axis=0), normal.max(axis=0)], axis=1),
     )

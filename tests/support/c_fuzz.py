@@ -122,8 +122,8 @@ class Bench:
             return status, message, True
         self.api.run_advance(run, STEPS)
         status, rows = self.progress(run).status, self.rows(run)
-        extremes = np.zeros(self.api.extremes_size)
-        self.api.run_extremes(run, pointer(extremes))
+        extremes = np.zeros((2, self.api.extremes_size))  # and their times
+        self.api.run_extremes(run, pointer(extremes[0]), pointer(extremes[1]))
         self.api.run_free(run)
         # The first values of extremes without a step are infinite.
         return status, message, bool(np.isfinite(rows).all()) and not bool(np.isnan(extremes).any())

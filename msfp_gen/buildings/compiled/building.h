@@ -104,7 +104,7 @@ struct msfp_building {
     double value;
     uint64_t identity; /* of all that the run computes from but its two-ports */
     int *entries, *faces; /* as in the scene, of the present models */
-    double *peaks; /* see peaks.c */
+    double *peaks; /* and then as many times; see peaks.c */
     table rows, steps; /* see state.c */
 };
 

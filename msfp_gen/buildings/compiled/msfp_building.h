@@ -31,8 +31,8 @@ typedef struct {
 } msfp_lapack;
 
 /* Where the contacts of a bearing are in the row of its model: number of surfaces, and of those concave up; indices of the
- * first normal force, contact angle and tilt, and how many coordinates each body has. Not checked: contacts on edges are
- * modelled. */
+ * first normal force, contact angle and tilt, how many coordinates each body has, and indices of the first gap and rim
+ * force. Not checked: contacts on edges are modelled. */
 enum {
     MSFP_FACES_CHECKED,
     MSFP_FACES_SURFACES,
@@ -41,6 +41,8 @@ enum {
     MSFP_FACES_ANGLES,
     MSFP_FACES_TILTS,
     MSFP_FACES_STRIDE,
+    MSFP_FACES_GAP,
+    MSFP_FACES_RIM,
     MSFP_FACES
 };
 
@@ -114,9 +116,10 @@ const double *msfp_building_steps(const msfp_building *b);
  * kinetic and strain energy. Of each bearing: of the displacement of its lower end less that of the upper one; of the
  * force on the upper end; the least and the largest compression there; the least value of each kept number of its rows;
  * their largest values; of each surface the largest sine of the angle at its sphere centre between the contact and the
- * axis of the slider while it is loaded, and when [s]. */
+ * axis of the slider while it is loaded; how many rims are met at one time. Times: when each was reached first [s]. */
 size_t msfp_building_peak_count(const msfp_building *b);
 const double *msfp_building_peaks(const msfp_building *b);
+const double *msfp_building_peak_times(const msfp_building *b);
 /* Motion of the ends [2][3][6] of a bearing, counted from 0, at the present state. */
 void msfp_building_ends(msfp_building *b, int bearing, double *ends);
 /* The two-port of a bearing, counted from 0, was replaced in the scene by one of another model in the present state;

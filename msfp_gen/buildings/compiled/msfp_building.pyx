@@ -75,6 +75,7 @@ cdef extern from "msfp_building.h":
     void msfp_building_counts(const msfp_building *, long *) noexcept nogil
     size_t msfp_building_peak_count(const msfp_building *) noexcept nogil
     const double *msfp_building_peaks(const msfp_building *) noexcept nogil
+    const double *msfp_building_peak_times(const msfp_building *) noexcept nogil
     void msfp_building_ends(msfp_building *, int, double *) noexcept nogil
     int msfp_building_replaced(msfp_building *, int, const int *, const int *) noexcept nogil
     size_t msfp_building_step_count(const msfp_building *) noexcept nogil
@@ -106,7 +107,7 @@ cdef class Run:
 
     The coordinates are r attachments and m oscillators on them. matrices (3, r, r): mass, damping, stiffness. shares (r, m)
     of the attachments in the oscillators, dampers and springs (m,). ports: the two-ports of all bearings, which take no other steps. rows (bearings, 6, r). grounds: knots and coefficients of each motion. ground_of (bearings,). entries:
-    of each bearing, indices into its row. faces (bearings, 7): where the contacts are in it. vectors: those of msfp_building.h: orders (k,), rows (k, 3, n), shares of the motions of the
+    of each bearing, indices into its row. faces (bearings, 9): where contacts and rims are in it. vectors: those of msfp_building.h: orders (k,), rows (k, 3, n), shares of the motions of the
     ground (k, grounds). node_rows (nodes, 6, n). arms (bearings, 2) [m].
     """
     cdef msfp_building *run
@@ -228,9 +229,11 @@ cdef class Run:
 
     @property
     def peaks(self):
-        """Peaks over all steps, one number after the other; see msfp_building.h."""
+        """Peaks over all steps and when each was reached first [s], one number after the other, (2, peaks); see
+        msfp_building.h."""
         cdef const double[::1] view = <double[:msfp_building_peak_count(self.run)]>msfp_building_peaks(self.run)
-        return np.array(view)
+        cdef const double[::1] times = <double[:msfp_building_peak_count(self.run)]>msfp_building_peak_times(self.run)
+        return np.array([view, times])
 
     @property
     def counts(self):

@@ -23,7 +23,7 @@ static int allocate(msfp_building *b)
                    { &b->driving, n },     { &b->x, r },        { &b->residual, r }, { &b->change, r },
                    { &b->scale, r },       { &b->strain, n - r }, { &b->scaled, (n - r) * r }, { &b->next_u, n },
                    { &b->product, n },     { &b->scratch, 3 * r }, { &b->stage_v, stages * n }, { &b->stage_a, stages * n },
-                   { &b->ground, (size_t)b->scene.grounds * MSFP_GROUND }, { &b->peaks, peak_count(b) } };
+                   { &b->ground, (size_t)b->scene.grounds * MSFP_GROUND }, { &b->peaks, 2 * peak_count(b) } };
     int complete = 1;
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i)
         complete &= (*arrays[i].to = calloc(arrays[i].count + 1, sizeof(double))) != NULL;

@@ -197,7 +197,7 @@ static void pass_state(msfp_building *b, tape *t)
     pass(t, b->power[0], sizeof b->power[0]);
     pass(t, b->counts, sizeof b->counts);
     pass(t, b->tangent, r * s->attachments);
-    pass(t, b->peaks, peak_count(b) * sizeof *b->peaks);
+    pass(t, b->peaks, 2 * peak_count(b) * sizeof *b->peaks);
     for (int i = 0; i < s->bearings; ++i)
         pass(t, b->members[i].wrench, sizeof b->members[i].wrench);
 }
@@ -208,7 +208,7 @@ static size_t state_size(const msfp_building *b)
     const msfp_building_scene *s = &b->scene;
     return (6 + 2 * (size_t)b->lengths) * sizeof(double) + 4 * sizeof(int) + 4 * (size_t)s->n * sizeof(double) + sizeof b->energies +
            sizeof b->power[0] + sizeof b->counts + (size_t)s->attachments * s->attachments * sizeof(double) +
-           (size_t)s->bearings * sizeof b->members[0].wrench + peak_count(b) * sizeof *b->peaks;
+           (size_t)s->bearings * sizeof b->members[0].wrench + 2 * peak_count(b) * sizeof *b->peaks;
 }
 
 static size_t fixed_size(const msfp_building *b)

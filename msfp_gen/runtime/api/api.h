@@ -73,7 +73,7 @@ void msfp_api_run_progress(const msfp_run *run, msfp_progress *progress);
 void msfp_api_run_state(const msfp_run *run, msfp_run_state *state);
 void msfp_api_run_hold_rows(msfp_run *run, size_t rows);
 void msfp_api_run_counts(const msfp_run *run, int64_t *counts);
-void msfp_api_run_extremes(const msfp_run *run, double *extremes);
+void msfp_api_run_extremes(const msfp_run *run, double *extremes, double *times);
 void msfp_api_run_trips(const msfp_run *run, msfp_trip *trips);
 const msfp_event *msfp_api_run_events(const msfp_run *run, size_t *count);
 const double *msfp_api_run_rows(const msfp_run *run, size_t *count);

@@ -56,9 +56,10 @@ void msfp_api_run_counts(const msfp_run *run, int64_t *counts)
         counts[i] = run->counts[i];
 }
 
-void msfp_api_run_extremes(const msfp_run *run, double *extremes)
+void msfp_api_run_extremes(const msfp_run *run, double *extremes, double *times)
 {
-    memcpy(extremes, &run->extremes, sizeof run->extremes);
+    give(extremes, &run->extremes, sizeof run->extremes);
+    give(times, &run->extreme_times, sizeof run->extreme_times);
 }
 
 void msfp_api_run_trips(const msfp_run *run, msfp_trip *trips)

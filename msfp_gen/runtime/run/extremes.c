@@ -1,4 +1,4 @@
-/* extremes.c: extremes over every accepted step, so that peaks do not depend on the times of the rows. */
+/* extremes.c: extremes over every accepted step and their times, so that peaks do not depend on the times of the rows. */
 #include <math.h>
 #include <string.h>
 #include "run.h"
@@ -6,7 +6,7 @@
 /* A field of msfp_extremes: of surfaces, or of a vector along E1, E2, E3 and in the horizontal plane. */
 typedef struct {
     int count, of; /* how many numbers; where in a row the first is of */
-    enum { MSFP_NUMBER, MSFP_LENGTH, MSFP_VECTOR } how; /* the length is that of two numbers */
+    enum { MSFP_NUMBER, MSFP_LENGTH, MSFP_VECTOR, MSFP_OPENING } how; /* length of two numbers; opening: below 0 */
     int least;                                          /* whether the least counts, otherwise the largest */
     int positions;                                      /* whether it follows from positions alone */
     int loaded;                                         /* whether only surfaces count that carry a normal force */
@@ -27,6 +27,8 @@ MSFP_INLINE double value_of(const field *f, const double *u, int k)
 {
     if (f->how == MSFP_VECTOR)
         return k < 3 ? fabs(u[k]) : length(u);
+    if (f->how == MSFP_OPENING)
+        return u[k] < 0.0 ? -u[k] : 0.0;
     return f->how == MSFP_LENGTH ? length(u + 2 * k) : u[k];
 }
 
@@ -39,7 +41,7 @@ int msfp_extreme_slopes(int index, const msfp_row *row, const double *across, in
     const int first = radial ? 0 : index * count;
     const double *u = numbers_of(f, row, across), value = value_of(f, u, index);
     for (int i = 0; i < count; ++i)
-        slopes[i] = f->how == MSFP_NUMBER ? 1.0 : value > 0.0 ? u[first + i] / value : 0.0;
+        slopes[i] = f->how == MSFP_NUMBER ? 1.0 : value > 0.0 ? u[first + i] / value : 0.0; /* of an opening -1 */
     *of = f->of + first;
     return count;
 }
@@ -50,10 +52,10 @@ enum wanted { ALL, OF_POSITIONS, OF_TOP_FORCE };
 /* Extremes with a row at a share of the last step. */
 static void take(msfp_run *run, const msfp_row *row, double share, enum wanted wanted)
 {
-    double displacement[3], *extreme = (double *)&run->extremes;
-    (void)share; /* without gradients */
+    double displacement[3], *extreme = (double *)&run->extremes, *time = (double *)&run->extreme_times;
+    const double before = run->now.t, after = run->next.t, at = share < 1.0 ? before + share * (after - before) : after;
     msfp_displacement_across(run, row, displacement);
-    for (const field *f = fields; f < fields + FIELDS; extreme += f++->count) {
+    for (const field *f = fields; f < fields + FIELDS; extreme += f->count, time += f++->count) {
         if ((wanted == OF_POSITIONS && !f->positions) || (wanted == OF_TOP_FORCE && f->of != MSFP_ROW_TOP_FORCE))
             continue;
         const double *u = numbers_of(f, row, displacement);
@@ -62,6 +64,7 @@ static void take(msfp_run *run, const msfp_row *row, double share, enum wanted w
             if ((f->loaded && !(row->normal[k] > 0.0)) || !(f->least ? value < extreme[k] : value > extreme[k]))
                 continue;
             extreme[k] = value;
+            time[k] = at;
             MSFP_HOOK(run, extreme_taken(run, (int)(extreme - (double *)&run->extremes) + k, share), (void)0);
         }
     }
@@ -89,7 +92,9 @@ static double outward_rate(const msfp_run *run, const msfp_point *at, const msfp
 void msfp_extremes_begin(msfp_run *run, const msfp_row *row)
 {
     memset(&run->extremes, 0, sizeof run->extremes);
-    double *extreme = (double *)&run->extremes;
+    double *extreme = (double *)&run->extremes, *time = (double *)&run->extreme_times;
+    for (size_t i = 0; i < MSFP_EXTREME_COUNT; ++i)
+        time[i] = run->now.t;
     for (const field *f = fields; f < fields + FIELDS; extreme += f++->count)
         for (int k = 0; k < f->count && f->how == MSFP_NUMBER; ++k) /* those with a sign; magnitudes begin at zero */
             extreme[k] = ((const double *)row)[f->of + k];

@@ -2,7 +2,7 @@
  * sliders, heat, and the range of the friction law; and whether the model is valid at a state at all.
  *
  * A monitor checks every step before it is accepted. It records the first time at which its limit is exceeded, and the
- * value furthest beyond it. Where the run is to stop, that step is not accepted, and the present state is the last one
+ * value furthest beyond it with its time. Where the run is to stop, that step is not accepted, and the present state is the last one
  * for which the model is valid.
  */
 #include <math.h>
@@ -206,7 +206,7 @@ static void record(msfp_run *run, int monitor, const finding *found, double time
     msfp_trip *trip = &run->monitor.trips[monitor];
     if (trip->surface && !(found->share > run->monitor.shares[monitor]))
         return;
-    *trip = (msfp_trip){ trip->surface ? trip->time : time, found->value, found->surface };
+    *trip = (msfp_trip){ trip->surface ? trip->time : time, found->value, time, found->surface };
     run->monitor.shares[monitor] = found->share;
 }
 

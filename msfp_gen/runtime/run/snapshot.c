@@ -9,7 +9,7 @@
 #include <string.h>
 #include "run.h"
 
-#define VERSION 2
+#define VERSION 3
 
 static const char magic[8] = { 'M', 'S', 'F', 'P', 'S', 'N', 'A', 'P' };
 

@@ -8,6 +8,7 @@ from support.buildings import BEARING, LOAD, rocking
 
 from msfp_gen import Auto, Effects, RunError, simulate
 from msfp_gen.buildings import scene as selection
+from msfp_gen.buildings.extremes import DIMENSIONS
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.run import start_run
 from msfp_gen.results.result import load_result
@@ -24,8 +25,9 @@ def unforeseen(monkeypatch: pytest.MonkeyPatch) -> None:
 def same(one: BuildingResult, other: BuildingResult) -> bool:
     names = ("time", "displacement", "acceleration", "wrench", "dissipated", "stored", "input", "received")
     rows = all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
-    peaks = zip(vars(one.extremes).values(), vars(other.extremes).values(), strict=True)
-    return rows and all(np.array_equal(*pair) for pair in peaks) and one.monitored == other.monitored
+    peaks = all(np.array_equal(getattr(one.extremes, name), getattr(other.extremes, name)) for name in DIMENSIONS)
+    times = all(np.array_equal(one.extremes.times[name], other.extremes.times[name]) for name in DIMENSIONS)
+    return rows and peaks and times and one.monitored == other.monitored
 
 
 @pytest.mark.slow

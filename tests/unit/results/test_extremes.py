@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from support import preset_run, scene_of
 from support.gradients import heated
 
 from msfp_gen import Motion, simulate
-from msfp_gen.results.history import Extremes
+from msfp_gen.results.history import LEAST, Extremes, series
 from msfp_gen.results.result import load_result
 from msfp_gen.specification import contract
 
@@ -68,9 +68,31 @@ def test_every_extreme_is_that_of_rows_close_together() -> None:
     recorded = simulate(replace(scene, output_step=0.45)).recorded_extremes
     assert recorded is not None
     names = [extreme.name for extreme in contract.extremes(scene.modelled)]
-    assert {*names} == {field.name for field in fields(Extremes) if getattr(recorded, field.name) is not None}
+    assert {*names} == recorded.arrays.keys() == recorded.times.keys()
     for name in names:
         assert getattr(recorded, name) == pytest.approx(getattr(rows, name), rel=1e-2), name
+
+
+@pytest.mark.parametrize(("name", "changes"), [("fenz-test5", {}), ("fenz-test2", {"uplift": True})], ids=str)
+def test_times_of_peaks_are_those_of_all_steps(name: str, changes: dict[str, object]) -> None:
+    """With rows at three instants, and with the rows of all steps, of which the times are taken independently."""
+    scene = scene_of(name, changes)
+    every, few = (simulate(replace(scene, output_step=step)) for step in (None, scene.end / 2))
+    recorded, history = few.recorded_extremes, every.history
+    assert len(few.history.time) == 3 and recorded is not None
+    names = [extreme.name for extreme in contract.extremes(scene.modelled)]
+    assert ("lift" in names) == ("uplift" in changes)
+    for extreme in names:
+        values = series(extreme, history)
+        assert values is not None
+        peaks = (values.argmin if extreme in LEAST else values.argmax)(axis=0)
+        found, longest = recorded.times[extreme], float(np.diff(history.time).max())
+        if extreme in ("displacement", "sliding", "gap"):  # they are also sought inside steps
+            assert found == pytest.approx(history.time[peaks], abs=longest), extreme
+        else:
+            assert found.tolist() == history.time[peaks].tolist(), extreme
+    assert max(recorded.rim_force) > 0 or name != "fenz-test5"
+    assert few.summary["times"]["peak_force"]["E3"] == recorded.times["top_force"][2]
 
 
 def test_a_turning_point_inside_a_step_counts() -> None:

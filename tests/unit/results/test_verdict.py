@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
@@ -168,8 +167,10 @@ def test_times_are_those_of_the_values() -> None:
     )
     reading = preset_run("fenz-test5").verdict.worst["rim_force"]
     history = preset_run("fenz-test5").history
-    row = int(np.flatnonzero(history.time == reading.value.time)[0])
-    assert history.rim_force[row, 0] == history.rim_force[:, 0].max()
+    row = int(history.rim_force[:, 0].argmax())
+    assert reading.value.time == pytest.approx(
+        history.time[row], abs=2 * np.diff(history.time[row - 1 : row + 2]).max()
+    )
 
 
 @pytest.mark.parametrize(
@@ -189,27 +190,25 @@ def test_value_and_surface_are_those_of_the_rows_at_the_time(run: Any) -> None:
             "displacement": one.history.horizontal[:, None],
         }.get(reading.limit.key)
         if rows is not None and value.time is not None:
-            row = int(np.flatnonzero(one.history.time == value.time)[0])
+            row = int(np.abs(one.history.time - value.time).argmin())  # peaks are those of steps
             assert rows[row, max(value.surface - 1, 0)] == pytest.approx(value.reached, rel=0.02)
             seen.add(reading.limit.key)
     assert {"axial_load", "displacement"} < seen
 
 
-def test_a_peak_that_no_row_has_gets_no_time() -> None:
+def test_a_peak_that_no_row_has_keeps_its_time() -> None:
     """Such as the rim force of a building in the step in which its run fails: not that of the first row."""
     run = at_the_rims()
+    known = judged(run, rim_force=1.0).worst["rim_force"].value
     quiet = replace(run, rim_force=np.zeros_like(run.rim_force), sliding=0.0 * run.sliding)
     reading = judged(quiet, rim_force=1.0).worst["rim_force"]
-    assert reading.value.reached > 9e3 and reading.value.time is None
-    assert not re.search(r"\d s[,)]", judged(quiet, rim_force=1.0).text.split("rim force")[1].split(";")[0])
-    assert reading.as_dict["time"] is None
-    note = Note(0.28, "heat", 4, 240.0, "")
+    assert reading.value == known and known.reached > 9e3 and known.time is not None
+    assert f"{known.time:.4g} s" in judged(quiet, rim_force=1.0).text
+    note = Note(0.28, "heat", 4, 240.0, "", value_time=1.5)
     hot = replace(preset_run("fenz-test2"), notes=(note,)).verdict.worst["temperature"]
-    assert hot.value == Value(4, None, 260.0, 250.0)
-    beyond = Note(0.28, "rims", 1, 0.02, "")
-    history = preset_run("fenz-test5").history
-    reading = replace(preset_run("fenz-test5"), notes=(beyond,)).verdict.worst["beyond_rim"]
-    assert reading.value.time == history.time[history.gap[:, 0].argmin()] != beyond.time
+    assert hot.value == Value(4, 1.5, 260.0, 250.0)
+    beyond = Note(0.28, "rims", 1, 0.02, "", value_time=0.9)
+    assert replace(preset_run("fenz-test5"), notes=(beyond,)).verdict.worst["beyond_rim"].value.time == 0.9
 
 
 def test_rims_at_one_time_do_not_depend_on_the_rows() -> None:

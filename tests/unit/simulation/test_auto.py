@@ -465,7 +465,7 @@ def test_a_run_interrupted_before_a_switch_resumes_through_it(tmp_path: Any, mon
 def test_a_note_in_the_step_of_a_switch_does_not_end_the_run() -> None:
     """Heat without numbers can only be noted; inertia, in the same step, is answered."""
     scene = replace(TEST2, effects=Auto())
-    trips = {"heat": (1.001, 2, 11.0), "inertia": (1.0, 1, 0.1)}
+    trips = {"heat": (1.001, 2, 11.0, 1.001), "inertia": (1.0, 1, 0.1, 1.0)}
     ending = Ending(scene.modelled, "monitor", 1.0, 0, 0.0, trips)
     assert next_effects(scene, ending) == replace(scene.modelled, sliders="inertial")
 
