@@ -91,6 +91,7 @@ def extremes_of_rows(result: BuildingResult) -> BuildingExtremes:
     normal = np.nan_to_num(result.normal_force)
     most = {name: np.nan_to_num(getattr(result, name)).max(axis=0) for name in OF_SURFACES}
     force, axial = np.moveaxis(result.wrench[:, :, 1, :3], 1, 0), result.axial_force
+    capacities = [one.arrays()["capacity"] for one in scene.every_bearing]
     base = scene.bearings[0].node
     points = {node.name: corner_points(scene, node.position) for node in scene.building.nodes}
 
@@ -122,7 +123,7 @@ def extremes_of_rows(result: BuildingResult) -> BuildingExtremes:
         axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
         **most,
         contact_offset=np.zeros_like(most["lift"]),
-        rims_met=(most["sliding"] >= np.array([one.arrays()["capacity"] for one in scene.every_bearing])).sum(axis=1),
+        rims_met=(result.sliding >= capacities).sum(axis=2).max(axis=0),
         times={},
         normal_force=np.stack([normal.min(axis=0), normal.max(axis=0)], axis=1),
     )

@@ -63,12 +63,12 @@ def replace_history(result: Result, **rows: Any) -> Result:
 @cache
 def at_the_rims() -> BuildingResult:
     """A frame whose lower dishes are met at every bearing."""
-    return simulate(scene(frame(), bearing=BEARING.replace(capacity=[0.03, 0.0215, 0.0215, 0.03])))
+    return simulate(scene(frame(), bearing=BEARING.replace(capacity=[0.03, 0.0215, 0.0215, 0.03]), output_step=1e-3))
 
 
 @cache
 def lifted() -> BuildingResult:
-    return simulate(rocking(Effects(uplift=True)))
+    return simulate(replace(rocking(Effects(uplift=True)), output_step=1e-3))
 
 
 @cache
