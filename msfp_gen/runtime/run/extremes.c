@@ -1,4 +1,4 @@
-/* extremes.c: extremes over every accepted step and their times, so that peaks do not depend on the times of the rows. */
+/* extremes.c: extremes over every accepted step and their times, so that peaks do not depend on times of rows. */
 #include <math.h>
 #include <string.h>
 #include "run.h"
@@ -46,6 +46,16 @@ int msfp_extreme_slopes(int index, const msfp_row *row, const double *across, in
     return count;
 }
 
+/* Whether a surface carries a normal force; where it may open, a remainder of N is left that keeps friction defined. */
+MSFP_INLINE int is_loaded(const msfp_row *row, int surface)
+{
+#if MSFP_UPLIFT
+    return !(row->compression[surface] < 0.0);
+#else
+    return row->normal[surface] > 0.0;
+#endif
+}
+
 /* What is taken of a row: all; what follows from positions alone; the force at the top. */
 enum wanted { ALL, OF_POSITIONS, OF_TOP_FORCE };
 
@@ -61,7 +71,7 @@ static void take(msfp_run *run, const msfp_row *row, double share, enum wanted w
         const double *u = numbers_of(f, row, displacement);
         for (int k = 0; k < f->count; ++k) {
             const double value = value_of(f, u, k);
-            if ((f->loaded && !(row->normal[k] > 0.0)) || !(f->least ? value < extreme[k] : value > extreme[k]))
+            if ((f->loaded && !is_loaded(row, k)) || !(f->least ? value < extreme[k] : value > extreme[k]))
                 continue;
             extreme[k] = value;
             time[k] = at;

@@ -2,8 +2,8 @@
  * sliders, heat, and the range of the friction law; and whether the model is valid at a state at all.
  *
  * A monitor checks every step before it is accepted. It records the first time at which its limit is exceeded, and the
- * value furthest beyond it with its time. Where the run is to stop, that step is not accepted, and the present state is the last one
- * for which the model is valid.
+ * value furthest beyond it with its time. Where the run is to stop, that step is not accepted, and the present state is
+ * the last one for which the model is valid.
  */
 #include <math.h>
 #include <string.h>

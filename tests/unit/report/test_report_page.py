@@ -83,7 +83,8 @@ def test_numbers_are_those_of_the_data_file(saved, page):
         (np.abs(data["energy_input"].values).max(), summary["energy"]["peak_input"]),
     ):
         assert peak == pytest.approx(value, rel=1e-5)
-    assert f"<td>{1e3 * summary['peak_displacement']['radial']:.4g} mm, along E1" in page
+    peak, time = (of["peak_displacement"]["radial"] for of in (summary, summary["times"]))
+    assert f"<td>{1e3 * peak:.4g} mm at {time:.4g} s, along E1" in page
     assert f"<td>{1e3 * summary['peak_sliding'][3]:.2f}</td>" in page
 
 
