@@ -167,19 +167,18 @@ def fields_in(root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, An
     read = stored_fields(root, variables, sizes)
     energy = {name: read.pop(f"energy_{name}") for name in ENERGY}
     history = History(**{field: read[field] for field in quantities() if field in read}, energy=energy)
-    recorded = _extremes(json.loads(str(about["extremes"])), surfaces) if "extremes" in about else None
     return {
         "scene": scene,
         "history": history,
         "events": _events(read, surfaces),
-        "gradients": _gradients(root, recorded, sizes),
+        "gradients": _gradients(root, sizes),
         "counters": Counters(**without(COUNTER, about)),  # type: ignore[arg-type]
         "notes": notes_in(about),
-        "recorded_extremes": recorded,
+        "recorded_extremes": _extremes(json.loads(str(about["extremes"])), surfaces) if "extremes" in about else None,
     }
 
 
-def _gradients(root: StoredGroup, recorded: Extremes | None, sizes: dict[str, int]) -> Gradients | None:
+def _gradients(root: StoredGroup, sizes: dict[str, int]) -> Gradients | None:
     """The derivatives with respect to parameters, where the file has some."""
     if GRADIENT not in root:
         return None
@@ -201,7 +200,7 @@ def _gradients(root: StoredGroup, recorded: Extremes | None, sizes: dict[str, in
         return Gradients(parameters, read, extremes, error)
 
     derivatives = gradients(error=gradients(ERROR) if f"extremes{ERROR}" in attributes else None)
-    needed = {field for name, (field, _) in SERIES.items() if getattr(recorded, name, None) is not None}
+    needed = {SERIES[name][0] for name in derivatives.extremes[0].arrays}
     if missing := sorted(needed - derivatives.arrays.keys()):
         raise ValueError(f"the gradient has no {missing[0]}")
     return derivatives

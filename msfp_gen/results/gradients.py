@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,10 +47,8 @@ class Gradients:
 def gradients_of_extremes(gradients: Gradients, history: History, recorded: Extremes) -> dict[str, Array]:
     """Derivatives of `Result.extremes` by name, each of shape (k, number of values) [SI]."""
     derivatives = {}
-    for name in (f.name for f in fields(Extremes) if f.name in SERIES):
+    for name in gradients.extremes[0].arrays:
         values = getattr(recorded, name)
-        if values is None:
-            continue
         steps = np.array([getattr(extremes, name) for extremes in gradients.extremes])
         values_of_rows, slopes = series(name, history), _slopes(name, gradients, history)
         assert values_of_rows is not None

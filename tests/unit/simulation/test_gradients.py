@@ -374,6 +374,14 @@ def test_each_derivative_has_its_error_where_a_rim_is_met(tmp_path: Path) -> Non
         assert np.all(np.array(summary["error"]["peak_sliding"]) >= 0)
 
 
+def test_the_largest_rim_force_is_differentiated_where_it_occurs() -> None:
+    found = simulate(replace(contact(), output_step=None), gradients=["motion.scale"], gradient_errors=False)
+    row = int(found.history.rim_force[:, 0].argmax())
+    slope = found.gradient.rim_force.sel(parameter="motion.scale").values[row, 0]
+    assert found.summary["peak_rim_force"][0] == found.history.rim_force[row, 0] > 0
+    assert found.gradient_summary["motion.scale"]["peak_rim_force"][0] == pytest.approx(slope, rel=1e-9) != 0
+
+
 def test_without_a_rim_contact_or_on_request_no_error_is_measured() -> None:
     for found in (result(), without_errors()):
         assert not [name for name in found.gradient.data_vars if str(name).endswith("_error")]
