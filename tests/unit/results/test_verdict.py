@@ -191,7 +191,8 @@ def test_value_and_surface_are_those_of_the_rows_at_the_time(run: Any) -> None:
         }.get(reading.limit.key)
         if rows is not None and value.time is not None:
             row = int(np.abs(one.history.time - value.time).argmin())  # peaks are those of steps
-            assert rows[row, max(value.surface - 1, 0)] == pytest.approx(value.reached, rel=0.02, abs=1e-7)
+            brief = 1e-6 if reading.limit.key == "uplift_height" else 0.0  # rows miss openings that are as small [m]
+            assert rows[row, max(value.surface - 1, 0)] == pytest.approx(value.reached, rel=0.02, abs=brief)
             seen.add(reading.limit.key)
     assert {"axial_load", "displacement"} < seen
 
