@@ -191,10 +191,11 @@ def test_value_and_surface_are_those_of_the_rows_at_the_time(run: Any) -> None:
         }.get(reading.limit.key)
         if rows is not None and value.time is not None:
             row = int(np.abs(one.history.time - value.time).argmin())  # peaks are those of steps
-            brief = 1e-6 if reading.limit.key == "uplift_height" else 0.0  # rows miss openings that are as small [m]
-            assert rows[row, max(value.surface - 1, 0)] == pytest.approx(value.reached, rel=0.02, abs=brief)
+            if reading.limit.key == "uplift_height" and abs(one.history.time[row] - value.time) > 1e-9:
+                continue  # a contact opens and closes between two rows
+            assert rows[row, max(value.surface - 1, 0)] == pytest.approx(value.reached, rel=0.02)
             seen.add(reading.limit.key)
-    assert {"axial_load", "displacement"} < seen
+    assert {"axial_load", "displacement"} < seen and ("uplift_height" in seen or run is not lifted)
 
 
 def test_a_peak_that_no_row_has_keeps_its_time() -> None:
