@@ -32,7 +32,7 @@ from msfp_gen.model.compiled import bodies_and_surfaces, separations_at_rest, to
 from msfp_gen.model.model import build_model
 from msfp_gen.results.history import Extremes
 from msfp_gen.results.result import load_result
-from msfp_gen.scene.effect_selection import slider_period
+from msfp_gen.scene.effect_selection import load_at_rest, slider_period
 from msfp_gen.scene.parameters import changed_parameters, parameters_of
 from msfp_gen.simulation.bearing_run import BearingRun
 from msfp_gen.simulation.gradients import RESOLVED_SHARE, measured_errors, start_gradients, with_gradient_errors
@@ -325,7 +325,8 @@ def test_undamped_ringing_is_noted_and_refused_where_it_is_resolved() -> None:
     assert "give contact_damping = 1e-4" in note.text
     with pytest.raises(InputError, match=r"resolves the undamped ringing .*give contact_damping = 1e-4"):
         simulate(replace(scene, solver=replace(scene.solver, max_step=2e-4)), gradients=PATHS)
-    above = replace(scene, solver=replace(scene.solver, max_step=1.2 * RESOLVED_SHARE * slider_period(scene)))
+    period = slider_period(scene.bearing, load_at_rest(scene))
+    above = replace(scene, solver=replace(scene.solver, max_step=1.2 * RESOLVED_SHARE * period))
     assert [note.kind for note in simulate(replace(above, duration=0.05), gradients=PATHS).notes] == ["ringing"]
 
 
