@@ -334,6 +334,9 @@ def compile_once(name: str, compiler: Compiler, flags: Sequence[str], log: Log, 
     """
     text, target = log.folder / f"{name}.i", log.folder / object_file(name)
     log.run(Step(name, (*compiler.command, *flags, "-E", "-P", name, "-o", text.name)))
+    if not text.is_file():  # no C compiler, which is named where it has linked nothing
+        log.run(compile_step(name, compiler, flags))
+        return
     inputs = f"{compiler.command} {compiler.path} {compiler.version} {flags}\0{name}\0".encode()
     path = shared / f"{hashlib.sha256(inputs + text.read_bytes()).hexdigest()[:40]}.o"
     text.unlink()

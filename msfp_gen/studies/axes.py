@@ -24,6 +24,7 @@ from msfp_gen.scene.file.catalogue import parsed, suggestion
 from msfp_gen.scene.file.changes import changed_table, keys_of, multiplied_table
 from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.scene.file.source import located_value, scene_of
+from msfp_gen.scene.scene_fields import SceneFields
 from msfp_gen.scene.system import System
 from msfp_gen.studies.bounding.factors import FactorTable
 from msfp_gen.studies.bounding.runs import scene_of_case
@@ -357,7 +358,7 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-WHOLE = ("building", "bearings")  # tables that a scene of a building reads together
+WHOLE = ("building", "bearings")  # tables that a scene of a building reads together; those of other kinds too
 INTENSITY = "intensity"  # column of the intensity measure of [records]
 
 
@@ -416,8 +417,9 @@ class SceneFactory:
             if axis.change == "sets"
         )
         self._table = base
+        shared = {field.name for field in fields(SceneFields)} - set(WHOLE)
         self._parts = {
-            field.name: getattr(self.base, field.name) for field in fields(self.base) if field.name not in WHOLE
+            field.name: getattr(self.base, field.name) for field in fields(self.base) if field.name in shared
         }
 
     def scene(self, values: Sequence[Any]) -> System:
@@ -433,7 +435,9 @@ class SceneFactory:
             for path in axis.paths if axis.change == "multiplies" else ():
                 table = multiplied_table(table, path, value, axis.surfaces)
         level: Any = table.get("fidelity", self._fidelity)
-        other = {key: value for key, value in table.items() if value is not self._table.get(key) or key in WHOLE}
+        other = {
+            key: value for key, value in table.items() if value is not self._table.get(key) or key not in self._parts
+        }
         scene = scene_of({key: value for key, value in other.items() if key != "fidelity"}, parts=self._parts)
         for axis, value in pairs:
             if axis.change == "factors":

@@ -16,7 +16,7 @@ from msfp_gen.report import write_report
 from msfp_gen.results.quantities import quantities
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file import catalogue
-from msfp_gen.scene.file.loader import scene_from_table, scene_text
+from msfp_gen.scene.file.loader import NO_PARTS, scene_from_table, scene_text
 from msfp_gen.scene.system import GROUP, Kind, OtherSystem, kinds
 from msfp_gen.simulation.bearing_run import start_bearing
 from msfp_gen.studies import read_study
@@ -57,9 +57,9 @@ class Pair(OtherSystem):
         return quantities(self.half)
 
 
-def pair_from_table(table: Mapping[str, Any], folder: Path | None = None, motion: Motion | None = None) -> Pair:
+def pair_from_table(table: Mapping[str, Any], folder: Path | None = None, parts: Mapping[str, Any] = NO_PARTS) -> Pair:
     inner = {key: value for key, value in table.items() if key != "pair"} | dict(table["pair"])
-    scene = scene_from_table(inner, folder, motion)
+    scene = scene_from_table(inner, folder, parts)
     return Pair(scene, scene.motion, scene.name)
 
 
