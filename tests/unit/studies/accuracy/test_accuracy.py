@@ -323,6 +323,7 @@ def test_errors_of_a_building_are_those_of_its_own_rows():
     assert "bearing displacement, base shear, floor acceleration and drift" in study.cost_table(found).columns[2]
 
 
+@pytest.mark.slow
 def test_simpler_models_of_a_building():
     found = model_errors(swaying(), tolerances=[1e-3], limit=60.0)
     notes = " ".join(found.notes)
