@@ -15,6 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import isfinite, nan
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -482,7 +483,11 @@ def draw_summary(study: Study, path: str | Path) -> None:
         f"tolerance {point.trial.rtol:g}": {"seconds": point.trial.seconds, "error": point.errors.worst_rms}
     }  # fmt: skip
     plot_work_precision(
-        table, path, errors={"error": f"error of {_quantities(study)}, RMS"}, marks=marks, title=summary_line(study)
+        table,
+        path,
+        errors={"error": fill(f"error of {_quantities(study)}, RMS", 48)},
+        marks=marks,
+        title=summary_line(study),
     )
 
 
