@@ -61,11 +61,11 @@ def test_only_notes_of_accuracy_count_and_what_is_not_known_counts_nowhere() -> 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(promises.COUNT))
 def test_the_stated_error_holds(number: int) -> None:
-    """Against a run with all effects for which the scene has parameters."""
+    """Against a run with all effects for which the scene has parameters; no error of a stack that comes apart."""
     scene = auto_scenes.demanding(promises.SEED, number)
     try:
         found = promises.promise(scene.name, scene)
     except RunError as error:
-        assert number not in KEPT and error.status == "accuracy", error
+        assert number not in KEPT and error.status in ("accuracy", "separated"), error
         return
     assert found.kept, found
