@@ -20,10 +20,14 @@ def inputs(scene: Scene) -> str:
     model = build_model(scene.bearing.layout, scene.effects)
     seen: list[Any] = []
 
-    def stack(*values: Any) -> None:
-        seen.extend(values)
+    made: list[tuple[Any, Any]] = []  # stacks, each with the values it was made of: seats at the start need one too
 
-    def run(_: None, *arrays: Any, **options: Any) -> None:
+    def stack(*values: Any) -> Any:
+        made.append((model.extension.Stack(*values), values))
+        return made[-1][0]
+
+    def run(own: Any, *arrays: Any, **options: Any) -> None:
+        seen.extend(next(values for one, values in made if one is own))
         motion_knots, motion, load_knots, load, jumps, q, v, f = arrays
         seen.extend([len(motion), motion_knots, motion, len(load), load_knots, load, len(jumps), jumps, q, v, f])
         names = ("rtol", "atol_angle", "max_steps", "duration", "output_step", "sampled")
