@@ -17,7 +17,7 @@ from msfp_gen.cli.console import (
     Workers,
     answer,
     build,
-    kept,
+    interruptible,
     load_source,
     note,
     note_exceeded,
@@ -169,7 +169,7 @@ def _bound_suite(
         make_folder(output, "--output")
     build(study.scene(1))
     count = len(study.inputs.records) - len(set(leave_out))
-    with kept(output), Progress(f"{count} record{'s' * (count > 1)} at their bounds") as update:
+    with interruptible(output), Progress(f"{count} record{'s' * (count > 1)} at their bounds") as update:
         bounds = module.bound_suite(study, output, leave_out=leave_out, workers=workers, progress=update)
     answer(bounds.as_dict(), module.suite_bound_tables(bounds), as_json)
     if output is not None:

@@ -168,7 +168,7 @@ def note_written(paths: Iterable[Path]) -> None:
 
 
 @contextmanager
-def kept(output: Path | None) -> Iterator[None]:
+def interruptible(output: Path | None) -> Iterator[None]:
     """Say where the runs of a study are if the block is interrupted. output: its folder; None: nowhere."""
     try:
         yield

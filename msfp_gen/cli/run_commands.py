@@ -265,8 +265,10 @@ def _run(
     force: bool = False,
 ) -> list[Path]:
     """Simulate, print and save; returns the paths. A failed run is printed and saved before its error is raised."""
-    require_meant(scene, force)
-    within = None if target is None else target.simulate(scene)
+    within = None
+    if target is not None:
+        require_meant(scene, force)
+        within = target.simulate(scene)
     options = {"strict": strict} | checkpoints.arguments
     with checkpoints.hint_on_write_error():
         result, failure = run_scene(scene, force, **options) if within is None else (within.result, None)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from msfp_gen.cli.console import AsJson, Progress, Workers, answer, kept, note, number, numbers, say
+from msfp_gen.cli.console import AsJson, Progress, Workers, answer, interruptible, note, number, numbers, say
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.common.tables import TABLE_SUFFIXES
@@ -124,7 +124,7 @@ def run(
         return
     if plot is not None:
         raise InputError("--plot: it draws an estimate; give --estimate too")
-    with kept(output), Progress(f"{definition.runs} runs") as progress:
+    with interruptible(output), Progress(f"{definition.runs} runs") as progress:
         done = module.study(definition, output, shard=part, progress=progress, **engine)
     judged = any(column.name == "limits_exceeded" for column in definition.keep.columns)
     _report(done, output, as_json, judged)
@@ -135,7 +135,7 @@ def _estimate(definition: Study, output: Path, options: dict[str, Any], plot: Pa
     from msfp_gen.studies.estimation.estimate import estimate, estimate_table, plot_estimate
 
     _check(plot, None)
-    with kept(output):
+    with interruptible(output):
         result = estimate(definition, output, **options)
     answer(result.as_dict(), [estimate_table(result)], as_json)
     for line in result.notes:

@@ -23,6 +23,7 @@ from msfp_gen.figures.style import CASE_COLOURS, COLOURS, FAINT, INK, THIN, dist
 from msfp_gen.report.frames import picture, render, write_page
 from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of
 from msfp_gen.scene.explain import explain
+from msfp_gen.scene.plausibility import G
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.sheet import Sheet
 from msfp_gen.studies.bounding import CASES, SuiteBounds, load_suite_bounds
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 
     from msfp_gen.studies.definition import Study
 
-G = 9.80665  # [m/s^2]
 PERIODS = np.geomspace(0.05, 6.0, 60)  # of the spectra [s]
 Captioned = tuple[str, "Figure"]
 # Quantities of parts, by section: column without its number.
@@ -373,9 +373,8 @@ def _energy(rows: Any) -> list[str]:
         return []
     worst = rows.loc[error.idxmax()]
     lines = [
-        "Every run keeps the balance of its energy: work of the ground and the loads, less what is stored and "
-        "dissipated. "
-        f"What remains is the error of the computation: at most {100 * error.max():.2g} % of the energy put in "
+        "The energy of every run is balanced: work of the ground and the loads, less what is stored and dissipated. "
+        f"What remains is an error of the computation: at most {100 * error.max():.2g} % of the peak energy "
         f"({worst['record']}, {worst['bounds']}), {100 * error.median():.2g} % in the median run."
     ]
     lines.append(f"The runs took {int(rows['steps'].min())} to {int(rows['steps'].max())} time steps.")

@@ -16,7 +16,7 @@ from msfp_gen import InputError, simulate
 from msfp_gen.buildings.modes import modes_of
 from msfp_gen.cli import main
 from msfp_gen.report import TitleBlock, analysis_html, write_analysis
-from msfp_gen.report.analysis import limit_table
+from msfp_gen.report.analysis import COMPARED, limit_table
 from msfp_gen.scene.file.source import scene_of
 from msfp_gen.studies.assessment.rows import read_study
 from msfp_gen.studies.bounding import CASES, bound_suite, load_suite_bounds, suite_study
@@ -103,7 +103,7 @@ def test_envelope_and_parts_are_those_of_the_rows(html: str, folder: Path) -> No
     assert f"storey 1 {cells}" in text
     peak = rows["peak_displacement"].to_numpy().reshape(2, 3) * 1e3
     assert "peak displacement [mm] " + " ".join(f"{v:.4g}" for v in (*peak.mean(axis=0), *peak.max(axis=0))) in text
-    assert f"at most {100 * rows['closure_error'].abs().max():.2g} % of the energy put in" in text
+    assert f"at most {100 * rows['closure_error'].abs().max():.2g} % of the peak energy" in text
 
 
 def test_shares_of_limits_are_those_of_the_runs(folder: Path) -> None:
@@ -172,3 +172,7 @@ def test_what_cannot_be_reported_is_one_line(folder: Path, tmp_path: Path, capsy
         assert not page.exists()
     with pytest.raises(InputError, match=r"\.html"):
         write_analysis(folder, tmp_path / "page.txt")
+
+
+def test_what_was_compared_stands_on_pages_that_exist() -> None:
+    assert all((ROOT / "docs" / f"{page}.md").is_file() for _, _, page in COMPARED)

@@ -63,9 +63,13 @@ def test_a_motion_is_evaluated_for_its_first_run_alone(monkeypatch):
 
 def test_the_memory_is_not_read_for_few_rows(monkeypatch):
     scene = scene_of("fenz-test2")
-    monkeypatch.setattr(memory, "available", lambda: pytest.fail("the memory was read"))
+    read, available = [], memory.available
+    monkeypatch.setattr(memory, "available", lambda: read.append(True) or available())
     simulate(scene)
     simulate(replace(scene, output_step=0.01))
+    assert not read
+    memory.require_memory([replace(scene, output_step=scene.end / 1e6)])
+    assert read
 
 
 def test_an_entry_of_the_summary_needs_no_other(asked, monkeypatch):
