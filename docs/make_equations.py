@@ -88,7 +88,7 @@ CONDENSED = """### The condensed equations
 
 What a run solves: interface forces are summed from the top plate down, contacts are in closed form, and the angular
 balances are left. `contact` is evaluated for all surfaces at once, since C solves for the friction of the end of the
-stage (`stage`, `shear`)."""
+stage (`friction_stage`, `friction_force`)."""
 
 UPLIFT = """With uplift (`docs/uplift.md`) the unilateral contacts and the rims give the forces of the surfaces, and
 what these leave of the sums are further rows, `excess`. Forces and moments are then"""
@@ -148,7 +148,7 @@ TITLES = {
     "locking_moment": "Moment that locks the spin of a body, which the lower end of a two-port exerts",
     "lower_wrench": "Wrench of the lower end of a two-port, about its position",
     "upper_wrench": "Wrench of the upper end",
-    "slid_friction": "Friction over the slip of a step in closed form: (3.18) integrated, (3.19)",
+    "friction_after_slip": "Friction over the slip of a step in closed form: (3.18) integrated, (3.19)",
     "slip_work": "Work of friction over that slip",
 }
 

@@ -84,8 +84,8 @@ class _Layout:
         surfaces = range(self.equations.spec.layout.surfaces)
         for order in ("", "1", "2"):
             yield from ((self.place("x", j + 1, f"{angle}{order}"), -1) for j in surfaces for angle in ANGLES)
-        for name in ("friction", "shear"):
-            other = "stage" if name == "friction" else ""
+        for name in ("friction", "friction_force"):
+            other = "friction_stage" if name == "friction" else ""
             for j in surfaces:
                 yield from (
                     (self.place(name, j, entry), self.place(other, j, entry) if other else -1) for entry in ("Y", "Z")
@@ -172,7 +172,10 @@ def equations_alone(spec: ModelSpec, example: Any) -> Generated:
     equations = derive(spec)
     schedules = _schedules(spec)
     calls = _calls(schedules)
-    used = {place.partition("[")[0] for call in calls for place in (*call.reads, *call.writes)} | {"shear", "stage"}
+    used = {place.partition("[")[0] for call in calls for place in (*call.reads, *call.writes)} | {
+        "friction_force",
+        "friction_stage",
+    }
     lists = [one for name, one in LISTS.items() if name in used and one.kept is not Kept.PARAMETERS]
     parts = _Layout(equations, lists)
     programs = _programs(equations, {name for call in calls for name in call.programs})

@@ -40,7 +40,7 @@ def _top(new: Maker) -> dict[str, Block]:
         .vector("F", "N", "-F_top: what the bearing exerts on the top support", POLAR)
         .vector("M", "N m", "-M_top about r_nn", AXIAL)
         .build(),
-        "foot_before": new("foot_before")
+        "foot_previous": new("foot_previous")
         .scalar("y", "m", "y of the foot less beta^2 y'', what the earlier stages give; y outside of a step")
         .scalar("y1", "m/s", "its rate less beta y''; y' outside of a step")
         .scalar("beta", "s", "diagonal entry of the stage formula; 0 outside of a step")
@@ -50,8 +50,8 @@ def _top(new: Maker) -> dict[str, Block]:
         .scalar("y1", "m/s", "its velocity")
         .build(),
         "foot_stage": new("foot_stage")
-        .scalar("y", "m", "as in foot_before")
-        .scalar("y1", "m/s", "as in foot_before")
+        .scalar("y", "m", "as in foot_previous")
+        .scalar("y1", "m/s", "as in foot_previous")
         .scalar("beta", "s", "the same where a mass rests on the spring; else 0")
         .scalar("mobility", "1/kg", "1/(m + c beta + k beta^2); 0 where no mass rests on the spring")
         .scalar("share", "-", "m times mobility; 1 where no mass rests on the spring")
@@ -89,12 +89,12 @@ class Blocks:
     contact_frame: Block
     relative: Block
     friction: Block
-    shear: Block
-    before: Block
-    stage: Block
+    friction_force: Block
+    friction_previous: Block
+    friction_stage: Block
     slip: Block
     slip_end: Block
-    slid: Block
+    friction_end: Block
     slip_work: Block
     unknowns: Block
     contact: Block
@@ -105,7 +105,7 @@ class Blocks:
     split: Block
     gap: Block
     top_wrench: Block
-    foot_before: Block
+    foot_previous: Block
     foot_stage: Block
     resting_foot: Block
     foot: Block
@@ -120,7 +120,7 @@ class Blocks:
     unilateral: Block
     unilateral_depth: Block
     friction_power: Block
-    closed_rim: Block
+    rim_motion: Block
     rim_energy: Block
     restraint: Block
     top_power: Block
@@ -259,16 +259,16 @@ def _interfaces(new: Maker) -> dict[str, Block]:
         .vector("dw", "rad/s", "omega'_above - omega'_below, basis of the body below", AXIAL)
         .build(),
         "friction": new("friction").scalar("Y", "-", "Y (3.18)").scalar("Z", "-", "Z (3.18)", 0).build(),
-        "shear": new("shear")
+        "friction_force": new("friction_force")
         .scalar("Y", "-", "friction force along t~1 over -mu N: Y + T dY/dt")
         .scalar("Z", "-", "friction force along t~2 over -mu N: Z + T dZ/dt", 0)
         .build(),
-        "before": new("before")
+        "friction_previous": new("friction_previous")
         .scalar("Y", "-", "Y that the earlier stages of the step give; Y itself outside of a step")
         .scalar("Z", "-", "Z likewise", 0)
         .scalar("beta", "s", "diagonal entry of the stage formula; 0 outside of a step")
         .build(),
-        "stage": new("stage")
+        "friction_stage": new("friction_stage")
         .scalar("Y", "-", "Y that the earlier stages of the step give; Y itself outside of a step")
         .scalar("Z", "-", "Z likewise", 0)
         .scalar("tau", "s", "beta + T, with beta the diagonal entry of the stage formula; 0 outside of a step")
@@ -283,7 +283,7 @@ def _interfaces(new: Maker) -> dict[str, Block]:
         .scalar("Y", "-", "Y at the end of the step")
         .scalar("N", "N", "mean of the normal forces at its ends")
         .build(),
-        "slid": new("slid")
+        "friction_end": new("friction_end")
         .scalar("Y", "-", "Y at the end of the step")
         .scalar("g", "-", "friction force over -mu N: Y + T dY/dt")
         .build(),
@@ -377,7 +377,7 @@ def _powers(new: Maker) -> dict[str, Block]:
         .scalar("damped", "W", "dissipated by contact damping")
         .scalar("lost", "W", "dissipated by plastic slip and by the drilling moment")
         .build(),
-        "closed_rim": new("closed_rim").scalar("g", "m", "gap (3.21)").scalar("dg", "m/s", "d gap/dt (2.102)").build(),
+        "rim_motion": new("rim_motion").scalar("g", "m", "gap (3.21)").scalar("dg", "m/s", "d gap/dt (2.102)").build(),
         "rim_energy": new("rim_energy")
         .scalar("stored", "J", "energy of the spring")
         .scalar("lost", "W", "power dissipated by the damper")

@@ -146,9 +146,9 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
         "contact", "contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19)"
     )
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    stage: Symbols = p.read(b.stage, "h", active=False)
+    stage: Symbols = p.read(b.friction_stage, "h", active=False)
     loc: Symbols = p.read(b.contact_frame, "loc")
-    g: Symbols = p.read(b.shear, "g")
+    g: Symbols = p.read(b.friction_force, "g")
     f = {name: p.let(g[name] - stage["rest"] * (g[name] - stage[name])) for name in ("Y", "Z")}
     shear = Shear(f["Y"], f["Z"], (stage["Y"], stage["Z"]), stage["tau"], p.let(1 - stage["rest"]))
     unknown = laws.read_unknown_coefficient(p, b, friction_model.coefficient, par)
@@ -173,11 +173,11 @@ def contact_stage(b: Blocks) -> Program:
     """Constants of the stage formula of Y, Z: f = f_0 + beta df/dt, so that f + T df/dt = f_0 + (beta + T) df/dt."""
     p = Program("contact_stage", "constants of the stage formula of friction, with the damping time of the contact")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    before: Symbols = p.read(b.before, "f", active=False)
+    before: Symbols = p.read(b.friction_previous, "f", active=False)
     tau = p.let(before["beta"] + par["td"])
     rest = Select(tau, par["td"] / p.let(Select(tau, tau, 1)), 1)
-    copied = {name: before[name] for name in b.stage.quantities if name not in ("tau", "rest")}
-    p.write(b.stage, {**copied, "tau": tau, "rest": rest}, tangents=False)
+    copied = {name: before[name] for name in b.friction_stage.quantities if name not in ("tau", "rest")}
+    p.write(b.friction_stage, {**copied, "tau": tau, "rest": rest}, tangents=False)
     return p
 
 

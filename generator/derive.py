@@ -88,7 +88,7 @@ def derive(spec: ModelSpec) -> Equations:
     if effects.top_rotation:
         programs.append(top.upright(blocks))
     if effects.permits_quasistatic_steps:
-        programs += [laws.slid_friction(blocks, effects.bouc_wen), laws.slip_work(blocks, effects.bouc_wen)]
+        programs += [laws.friction_after_slip(blocks, effects.bouc_wen), laws.slip_work(blocks, effects.bouc_wen)]
     if effects.rims:
         programs += [contact.rim_coordinates(blocks), contact.rim(blocks)]
     if effects.uplift:

@@ -62,10 +62,10 @@ RUNTIME: Mapping[tuple[str, str], tuple[str, tuple[str, ...]]] = {
         "msfp_contact_columns",
         ("p", "dp", "w", "ds->point", "ds->slopes", "s->weights", "ds->all", "d"),
     ),
-    ("closed_rim", "values"): ("msfp_gap_of_rim", ("w", "j", "s->closed_rim[j]")),
-    ("closed_rim", "directions"): (
-        "msfp_closed_rim_columns",
-        ("p", "dp", "w", "d", "j", "s->closed_rim[j]", "ds->closed_rim[j]"),
+    ("rim_motion", "values"): ("msfp_gap_of_rim", ("w", "j", "s->rim_motion[j]")),
+    ("rim_motion", "directions"): (
+        "msfp_rim_motion_columns",
+        ("p", "dp", "w", "d", "j", "s->rim_motion[j]", "ds->rim_motion[j]"),
     ),
     ("rim", "values"): ("msfp_rim_force", ("p", "w", "j", "s->jacobians->rim[j]")),
     ("unilateral_inside", "values"): ("msfp_unilateral_force", ("p", "w", "j")),
@@ -442,7 +442,7 @@ def _of_solved(call: Call, form: Form) -> Iterator[Line]:
     elif call.program in form.kernels:
         derivatives = form.kernels[call.program].program
         # The friction force of the surfaces, for which the runtime solves, is not in a list.
-        reads = ["s->g[j]" if place == "shear[j]" else _in_c(place, "values") for place in call.reads]
+        reads = ["s->g[j]" if place == "friction_force[j]" else _in_c(place, "values") for place in call.reads]
         given = [*reads, *_all_in_c(call.writes, "values"), *_moving(call, derivatives, form.name)]
         called = _statement(f"msfp_{derivatives.name}", [*given, *_all_in_c(call.writes, form.name)])
         when = _line(BY_ENDS[call.program], "p") if call.program == "foot" else Line(BY_ENDS[call.program])

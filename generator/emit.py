@@ -260,7 +260,7 @@ def emit(
         "vectors": vector_quantities,
         "scalars": scalar_quantities,
         "frame_inputs": len(equations.blocks.contact_frame.fields)
-        + len(equations.blocks.shear.fields)
+        + len(equations.blocks.friction_force.fields)
         + (law is not None),
         "law": law,
         "closed_form": spec.effects.permits_quasistatic_steps,

@@ -46,7 +46,7 @@ def rim_energy(b: Blocks) -> Program:
     """
     p = Program("rim_energy", "energy stored in a closed rim, and power dissipated there")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    rim: Symbols = p.read(b.closed_rim, "rim", active=False)
+    rim: Symbols = p.read(b.rim_motion, "rim", active=False)
     lever = p.let(1 - par["pr"] / par["R"], "lever")
     spring, damper = p.let(par["kc"] * rim["g"], "spring"), p.let(par["cc"] * rim["dg"], "damper")
     pushes = p.let(Step(-spring - damper), "pushes")  # (3.23) clamped: docs/model.md, choice 4
@@ -136,11 +136,11 @@ def lock_power(b: Blocks) -> Program:
     return p
 
 
-def closed_rim(b: Blocks) -> Program:
+def rim_motion(b: Blocks) -> Program:
     """Gap of a rim and its rate, whether it pushes or not."""
-    p = Program("closed_rim", "gap of a rim and its rate")
+    p = Program("rim_motion", "gap of a rim and its rate")
     rim: Symbols = p.read(b.rim, "rim", active=False)
-    p.write(b.closed_rim, {"g": rim["g"], "dg": rim["dg"]}, tangents=False)
+    p.write(b.rim_motion, {"g": rim["g"], "dg": rim["dg"]}, tangents=False)
     return p
 
 
@@ -185,7 +185,7 @@ def programs(b: Blocks, rims: bool, uplift: bool, rotating_support: bool) -> lis
     """All programs of the energy balance but the energies of masses."""
     return [
         friction_power(b, uplift),
-        *([closed_rim(b), rim_energy(b)] if rims else []),
+        *([rim_motion(b), rim_energy(b)] if rims else []),
         *([unilateral_energy(b)] if uplift else []),
         works(b, rims, uplift),
         restraint(b, rotating_support),

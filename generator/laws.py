@@ -147,9 +147,9 @@ def _after_slip(p: Program, plastic: bool, Y: sp.Expr, slip: sp.Expr) -> tuple[s
     return p.let(direction * end), Select(left, lost, 0)
 
 
-def slid_friction(b: Blocks, law: str) -> Program:
+def friction_after_slip(b: Blocks, law: str) -> Program:
     """Friction at the end of a step: Y, and the force over -mu N, Y + T dY/dt, of the sheared contact."""
-    p = Program("slid_friction", "friction after the slip of a step, (3.18) integrated in closed form")
+    p = Program("friction_after_slip", "friction after the slip of a step, (3.18) integrated in closed form")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     step: Symbols = p.read(b.slip, "s", active=False)
     local: Symbols = p.read(b.contact_frame, "loc", active=("dw",))
@@ -161,7 +161,7 @@ def slid_friction(b: Blocks, law: str) -> Program:
         g = Clamp(p.let(Y + sheared))
     else:
         g = Y + sheared * p.let(1 - Step(p.let(Y * rate)) * p.let(Y**2))  # (3.18)
-    p.write(b.slid, {"Y": Y, "g": g}, columns="1")
+    p.write(b.friction_end, {"Y": Y, "g": g}, columns="1")
     return p
 
 
@@ -224,8 +224,8 @@ def _add_memory_fields(b: Blocks, memory: Memory) -> Blocks:
         )
     return replace(
         b,
-        before=with_fields(b.before, fields),
-        stage=with_fields(b.stage, fields),
+        friction_previous=with_fields(b.friction_previous, fields),
+        friction_stage=with_fields(b.friction_stage, fields),
         contact=with_fields(b.contact, results),
         report_contact=with_fields(b.report_contact, [source]),
     )
@@ -265,7 +265,7 @@ def law_results(
         law: friction law.
         par: symbols of the surface parameters.
         unknown: the result of `read_unknown_coefficient`.
-        stage: symbols of the block `stage`.
+        stage: symbols of the block `friction_stage`.
         loc: symbols of the block `contact_frame`.
         N: normal force.
         df_dg: as in `Shear`.
@@ -303,7 +303,7 @@ def evaluate_law(
     memory = law.memory
     if memory is None:
         return {**par, "mu": coefficient(p, law, par, variables)}, {}
-    stage: Symbols = p.read(b.stage, "h", active=False)
+    stage: Symbols = p.read(b.friction_stage, "h", active=False)
     value = p.let(start_of(memory, par) + stage["past"], memory.variable)
     mu = coefficient(p, law, par, {**variables, memory.variable: value})
     source = source_of(p, memory, par, variables, loc)

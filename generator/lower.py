@@ -189,7 +189,7 @@ DIFFERENTIATED = {
     "resting_foot": False,
     "foot": True,
     "gap": True,
-    "slid_friction": False,
+    "friction_after_slip": False,
     "slip_work": False,
 }
 """Programs that gradients differentiate beside those of their schedules (`drivers.directional_kernels`), and whether

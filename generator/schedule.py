@@ -180,9 +180,9 @@ LISTS: Mapping[str, List] = {
     "angular": List("angular", "angular", per=Per.BODY),
     "balances": List("balances", "balances", per=Per.BODY),
     "contact_frame": List("contact_frame", "contact_frame", Kept.WORK, Per.SURFACE, directions=True),
-    "before": List("before", "before", per=Per.SURFACE),
-    "stage": List("stage", "stage", Kept.WORK, Per.SURFACE, directions=True),
-    "shear": List("shear", "shear", per=Per.SURFACE),
+    "friction_previous": List("friction_previous", "friction_previous", per=Per.SURFACE),
+    "friction_stage": List("friction_stage", "friction_stage", Kept.WORK, Per.SURFACE, directions=True),
+    "friction_force": List("friction_force", "friction_force", per=Per.SURFACE),
     "contact": List("contact", "contact", Kept.WORK, Per.SURFACE, directions=True),
     "local_moment": List("moment", "local_moment", per=Per.SURFACE),
     "unilateral": List("unilateral", "unilateral", Kept.WORK, Per.SURFACE, directions=True),
@@ -193,7 +193,7 @@ LISTS: Mapping[str, List] = {
     "below": List("moment", "below", Kept.WORK, Per.BODY),
     "base_motion": List("base_motion", "base_motion"),
     "energy": List("energy", "energy"),
-    "closed_rim": List("closed_rim", "closed_rim", per=Per.SURFACE),
+    "rim_motion": List("rim_motion", "rim_motion", per=Per.SURFACE),
     "lock": List("lock", "lock", Kept.WORK, Per.SURFACE, directions=True),
     "restraint": List("restraint", "restraint"),
     "rim_energy": List("rim_energy", "rim_energy"),
@@ -282,7 +282,7 @@ def _rim(effects: Effects) -> tuple[Call, ...]:
     )
 
 
-STAGE = Call("contact_stage", ("surface_parameters[j]", "before[j]"), ("stage[j]",))
+STAGE = Call("contact_stage", ("surface_parameters[j]", "friction_previous[j]"), ("friction_stage[j]",))
 """Constants of the stage formula of friction, and of a memory."""
 
 
@@ -293,7 +293,7 @@ def momentum_balances(effects: Effects) -> Schedule:
     given psi~, theta~ and N, is the same are further rows.
     """
     memory, uplift = effects.law is not None and effects.law.memory is not None, effects.uplift
-    remembered = ("stage[j]",) if memory else ()
+    remembered = ("friction_stage[j]",) if memory else ()
     rim = ("rim[j]",) if effects.rims else ()
     above = "below[k]" if uplift else "moment[k]"
     surfaces = Pass(
@@ -414,7 +414,7 @@ def condensed(effects: Effects) -> Schedule:
                 (
                     Call(
                         "contact",
-                        ("surface_parameters[j]", "stage[j]", "contact_frame[j]", "shear[j]", *law),
+                        ("surface_parameters[j]", "friction_stage[j]", "contact_frame[j]", "friction_force[j]", *law),
                         ("contact[j]",),
                         contact,
                     ),
@@ -433,14 +433,14 @@ def energies(effects: Effects) -> Schedule:
     upright = ("upright",) if effects.top_rotation else ()
     at_rim = (
         Call(
-            "closed_rim",
+            "rim_motion",
             ("rim[j]",),
-            ("closed_rim[j]",),
+            ("rim_motion[j]",),
             Solve(frozenset({"directions"})),
         ),
         Call(
             "rim_energy",
-            ("surface_parameters[j]", "closed_rim[j]"),
+            ("surface_parameters[j]", "rim_motion[j]"),
             ("rim_energy",),
             If({"rim_energy": When.RIM_CLOSED}, Values.HERE),
             adds=True,

@@ -59,7 +59,7 @@ def spring_stage(b: Blocks) -> Program:
     """
     p = Program("spring_stage", "constants of the stage formula of the foot")
     par: Symbols = p.read(b.top_parameters, "par", active=False)
-    before: Symbols = p.read(b.foot_before, "f", active=False)
+    before: Symbols = p.read(b.foot_previous, "f", active=False)
     mass = p.let(par["m"] - par["mz"])
     beta = p.let(Select(mass, before["beta"], 0))
     moving = p.let(mass + beta * p.let(par["cv"] + beta * par["kv"]))

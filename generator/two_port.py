@@ -59,8 +59,8 @@ WIDTH = "MSFP_PORT_FREEDOMS"
 """C constant with the number of columns: the freedoms of both ends."""
 FIXED: Mapping[str, tuple[str, ...]] = {
     "foot_stage": ("beta", "mobility", "share"),
-    "before": ("beta", "gain"),
-    "stage": ("tau", "rest", "gain"),
+    "friction_previous": ("beta", "gain"),
+    "friction_stage": ("tau", "rest", "gain"),
     "far_end": ("a", "rest", "axial"),
     "body": ("vc", "rc"),
 }
@@ -145,7 +145,12 @@ def _moving_of(block: Block) -> list[str]:
 def moving(blocks: Blocks) -> Iterator[tuple[str, str]]:
     """The fields that the motion of an end changes before an evaluation, as (list, field) of the schedule."""
     lists = {"x": blocks.coordinates, "frame": blocks.body, "load_moment": blocks.moment, "support": blocks.support}
-    lists |= {"lock": blocks.lock, "far_end": blocks.far_end, "foot_stage": blocks.foot_stage, "before": blocks.before}
+    lists |= {
+        "lock": blocks.lock,
+        "far_end": blocks.far_end,
+        "foot_stage": blocks.foot_stage,
+        "friction_previous": blocks.friction_previous,
+    }
     for name, block in lists.items():
         yield from ((name, field) for field in fields_of(block, _moving_of(block)))
 

@@ -115,7 +115,7 @@ typedef struct {
 } msfp_stage_weights;
 
 /* Rates of the states of a surface: dY/dt, dZ/dt, and the source of a memory. */
-#define MSFP_SURFACE_RATES (MSFP_SHEAR_SIZE + (MSFP_MEMORY > 0))
+#define MSFP_SURFACE_RATES (MSFP_FRICTION_FORCE_SIZE + (MSFP_MEMORY > 0))
 /* Rows of the Jacobian of a contact: its moment, N, and in models with gradients these rates. */
 #define MSFP_CONTACT_ROWS (MSFP_MOMENT_SIZE + 1 + MSFP_GRADIENTS * MSFP_SURFACE_RATES)
 /* Jacobians of all surfaces with respect to their inputs: of the contacts, lane by lane; of the rims. */
@@ -130,7 +130,7 @@ typedef struct {
     double body[MSFP_NB + 1][MSFP_BODY_SIZE];
     double force[MSFP_NB + 1][MSFP_FORCE_SIZE], moment[MSFP_NB + 1][MSFP_MOMENT_SIZE];
     double contact_frame[MSFP_NB][MSFP_CONTACT_FRAME_SIZE];
-    double stage[MSFP_NB][MSFP_STAGE_SIZE], contact[MSFP_NB][MSFP_CONTACT_SIZE];
+    double friction_stage[MSFP_NB][MSFP_FRICTION_STAGE_SIZE], contact[MSFP_NB][MSFP_CONTACT_SIZE];
     double rim[MSFP_NB][MSFP_RIM_SIZE];
     int rim_active[MSFP_NB]; /* whether the rim pushes */
     double rim_gap[MSFP_NB], rim_rate[MSFP_NB]; /* gap of a closed rim, with uplift of every rim, and its rate [m], [m/s] */

@@ -1,5 +1,5 @@
 MSFP_INLINED
-static inline void msfp_contact_jacobian(const double *restrict par /* surface_parameters */, const double *restrict h /* stage */, const double *restrict loc /* contact_frame */, const double *restrict g /* shear */, double *restrict out, double *restrict jacobian /* [row][input] */)
+static inline void msfp_contact_jacobian(const double *restrict par /* surface_parameters */, const double *restrict h /* friction_stage */, const double *restrict loc /* contact_frame */, const double *restrict g /* friction_force */, double *restrict out, double *restrict jacobian /* [row][input] */)
 {
     for (int lane = 0; lane < MSFP_LANES; ++lane) {
         const double par_sign = par[0 * MSFP_LANES + lane];

@@ -1,7 +1,7 @@
 /* contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19).
  * 140 operations; out: contact. Evaluated for all surfaces or unknowns at once: [field][MSFP_LANES]. */
 MSFP_INLINED
-static inline void msfp_contact_lanes(const double *restrict par /* surface_parameters */, const double *restrict h /* stage */, const double *restrict loc /* contact_frame */, const double *restrict g /* shear */, const double *restrict c /* coefficient */, double *restrict out)
+static inline void msfp_contact_lanes(const double *restrict par /* surface_parameters */, const double *restrict h /* friction_stage */, const double *restrict loc /* contact_frame */, const double *restrict g /* friction_force */, const double *restrict c /* coefficient */, double *restrict out)
 {
     for (int lane = 0; lane < MSFP_LANES; ++lane) {
         const double par_sign = par[0 * MSFP_LANES + lane];

@@ -16,7 +16,7 @@
 
 enum {
     LANES = MSFP_LANES,
-    FRICTION = MSFP_SHEAR_SIZE,
+    FRICTION = MSFP_FRICTION_FORCE_SIZE,
     UNKNOWNS = FRICTION + MSFP_LAW,   /* local unknowns: g, and mu where it follows a law */
     ROWS = MOMENT + UNKNOWNS + 1,     /* of the Jacobian of a contact: M, dY, dZ, mu, N */
     INPUTS = MSFP_CONTACT_FRAME_SIZE, /* force and slip rotation */
@@ -32,7 +32,7 @@ enum {
 
 /* Fields of all surfaces, [field][lane]; spare lanes repeat the last surface. */
 typedef struct {
-    double contact_frame[INPUTS * LANES], stage[MSFP_STAGE_SIZE * LANES], g[FRICTION * LANES],
+    double contact_frame[INPUTS * LANES], stage[MSFP_FRICTION_STAGE_SIZE * LANES], g[FRICTION * LANES],
         out[MSFP_CONTACT_SIZE * LANES];
 #if MSFP_LAW
     double x[MSFP_COEFFICIENT_SIZE * LANES];
@@ -48,8 +48,8 @@ MSFP_INLINE void gather(const msfp_work *w, double g[NB][2], lanes *all)
             all->contact_frame[k * LANES + s] = w->contact_frame[j][k];
         for (int k = 0; k < FRICTION; ++k)
             all->g[k * LANES + s] = g[j][k];
-        for (int k = 0; k < MSFP_STAGE_SIZE; ++k)
-            all->stage[k * LANES + s] = w->stage[j][k];
+        for (int k = 0; k < MSFP_FRICTION_STAGE_SIZE; ++k)
+            all->stage[k * LANES + s] = w->friction_stage[j][k];
 #if MSFP_LAW
         const double mu = w->coefficient[j][MSFP_COEFFICIENT_MU];
         all->x[s] = fabs(mu) < 1e3 ? mu : 0.0; /* not finite after a failed step */
@@ -93,7 +93,7 @@ MSFP_INLINE void solve_small(const double *a, double *b)
 MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, int held, double *step, double *best)
 {
     double a[FRICTION * FRICTION * LANES], newton[FRICTION * LANES], size[LANES], sum[LANES];
-    const double *out = all->out, *tau = all->stage + MSFP_STAGE_TAU * LANES;
+    const double *out = all->out, *tau = all->stage + MSFP_FRICTION_STAGE_TAU * LANES;
     int unconverged = 0, not_finite = 0;
     (void)held; /* of a law alone */
     for (int s = 0; s < LANES; ++s)
@@ -229,19 +229,20 @@ MSFP_INLINE int closed_form_stage(const msfp_parameters *p, msfp_work *w, const 
     double finite = 0.0;
     for (int s = 0; s < LANES; ++s) {
         const int j = s < NB ? s : NB - 1;
-        double slid[MSFP_SLID_SIZE], slopes[MSFP_SLID_SIZE];
+        double slid[MSFP_FRICTION_END_SIZE], slopes[MSFP_FRICTION_END_SIZE];
         if (slope) {
-            msfp_slid_friction_tangent(p->surface[j], weights->slip[j], w->contact_frame[j], slid, unit, slopes);
-            slope[s] = slopes[MSFP_SLID_G];
+            msfp_friction_after_slip_tangent(p->surface[j], weights->slip[j], w->contact_frame[j], slid, unit, slopes);
+            slope[s] = slopes[MSFP_FRICTION_END_G];
         } else
-            msfp_slid_friction(p->surface[j], weights->slip[j], w->contact_frame[j], slid);
-        all->g[s] = slid[MSFP_SLID_G];
-        w->stage[j][MSFP_STAGE_Y] = slid[MSFP_SLID_Y]; /* the kernel leaves Y as it is, and gives its rate */
-        w->stage[j][MSFP_STAGE_TAU] = p->surface[j][MSFP_SURFACE_PARAMETERS_TD];
-        w->stage[j][MSFP_STAGE_REST] = 1.0;
-        for (int k = 0; k < MSFP_STAGE_SIZE; ++k)
-            all->stage[k * LANES + s] = w->stage[j][k];
-        finite += slid[MSFP_SLID_Y];
+            msfp_friction_after_slip(p->surface[j], weights->slip[j], w->contact_frame[j], slid);
+        all->g[s] = slid[MSFP_FRICTION_END_G];
+        /* the kernel leaves Y as it is, and gives its rate */
+        w->friction_stage[j][MSFP_FRICTION_STAGE_Y] = slid[MSFP_FRICTION_END_Y];
+        w->friction_stage[j][MSFP_FRICTION_STAGE_TAU] = p->surface[j][MSFP_SURFACE_PARAMETERS_TD];
+        w->friction_stage[j][MSFP_FRICTION_STAGE_REST] = 1.0;
+        for (int k = 0; k < MSFP_FRICTION_STAGE_SIZE; ++k)
+            all->stage[k * LANES + s] = w->friction_stage[j][k];
+        finite += slid[MSFP_FRICTION_END_Y];
     }
     msfp_contact_lanes(&p->lanes[0][0], all->stage, all->contact_frame, all->g, all->out);
     return finite < INFINITY && finite > -INFINITY ? MSFP_OK : MSFP_E_FINITE;
@@ -251,9 +252,9 @@ double msfp_friction_after_turn(const double *par, double Y, double turn)
 {
     static const double rates[INPUTS];
     const double slip[MSFP_SLIP_SIZE] = { [MSFP_SLIP_Y] = Y, [MSFP_SLIP_TURN] = turn };
-    double slid[MSFP_SLID_SIZE];
-    msfp_slid_friction(par, slip, rates, slid);
-    return slid[MSFP_SLID_Y];
+    double slid[MSFP_FRICTION_END_SIZE];
+    msfp_friction_after_slip(par, slip, rates, slid);
+    return slid[MSFP_FRICTION_END_Y];
 }
 
 void msfp_work_of_slip(const double *par, const double *slip, const double *end, double *work)
@@ -287,7 +288,7 @@ MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
             const double *from =
                 jacobian + ((MOMENT + r) * MSFP_FRAME_INPUTS + (c < UNKNOWNS ? INPUTS + c : c - UNKNOWNS)) * LANES;
             for (int s = 0; s < LANES; ++s) {
-                const double scaled = (r < FRICTION ? all->stage[MSFP_STAGE_TAU * LANES + s] : 1.0) * from[s];
+                const double scaled = (r < FRICTION ? all->stage[MSFP_FRICTION_STAGE_TAU * LANES + s] : 1.0) * from[s];
                 a[r][c][s] = c < UNKNOWNS ? (r == c) - scaled : scaled;
             }
         }

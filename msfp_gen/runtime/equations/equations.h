@@ -143,7 +143,7 @@ void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const double *dfo
 
 /* Inputs of energies and powers that are not in `w`: motion of the base, load, axis of a rotating support. */
 void msfp_set_observed(const msfp_point *at, msfp_blocks *s);
-/* Gap of the rim of surface j and its rate, as the block `closed_rim`. */
+/* Gap of the rim of surface j and its rate, as the block `rim_motion`. */
 void msfp_gap_of_rim(const msfp_work *w, int j, double *rim);
 /* Power that plastic slip and the drilling moment dissipate at surface j [W]. */
 double msfp_heating(const msfp_parameters *p, const msfp_work *w, int j);

@@ -102,14 +102,14 @@ MSFP_WIDE void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, c
         load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
     msfp_set_loads(p, at, s);
     for (int j = 0; j < NB; ++j) {
-        double *before = s->before[j];
+        double *before = s->friction_previous[j];
         MSFP_UNROLL
-        for (int i = 0; i < MSFP_SHEAR_SIZE; ++i)
-            before[MSFP_BEFORE_Y + i] = weights ? weights->fp[j][i] : at->f[j][i];
-        before[MSFP_BEFORE_BETA] = weights ? weights->beta : 0.0;
+        for (int i = 0; i < MSFP_FRICTION_FORCE_SIZE; ++i)
+            before[MSFP_FRICTION_PREVIOUS_Y + i] = weights ? weights->fp[j][i] : at->f[j][i];
+        before[MSFP_FRICTION_PREVIOUS_BETA] = weights ? weights->beta : 0.0;
 #if MSFP_MEMORY
-        before[MSFP_BEFORE_PAST] = at->past[j];
-        before[MSFP_BEFORE_GAIN] = at->gain;
+        before[MSFP_FRICTION_PREVIOUS_PAST] = at->past[j];
+        before[MSFP_FRICTION_PREVIOUS_GAIN] = at->gain;
 #endif
     }
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
@@ -156,7 +156,7 @@ double msfp_sprung_mass(const msfp_parameters *p)
 
 void msfp_foot_stage(const msfp_parameters *p, const msfp_point *at, double *stage)
 {
-    const double before[MSFP_FOOT_BEFORE_SIZE] = { at->foot[0], at->foot[1], at->foot_beta };
+    const double before[MSFP_FOOT_PREVIOUS_SIZE] = { at->foot[0], at->foot[1], at->foot_beta };
     if (msfp_top_is_sprung(p))
         msfp_spring_stage(p->top, before, stage);
     else

@@ -38,8 +38,8 @@ msfp_mechanical msfp_mechanical_energy(const msfp_parameters *p, const msfp_poin
 
 void msfp_gap_of_rim(const msfp_work *w, int j, double *rim)
 {
-    rim[MSFP_CLOSED_RIM_G] = w->rim_gap[j];
-    rim[MSFP_CLOSED_RIM_DG] = w->rim_rate[j];
+    rim[MSFP_RIM_MOTION_G] = w->rim_gap[j];
+    rim[MSFP_RIM_MOTION_DG] = w->rim_rate[j];
 }
 
 msfp_input_parts msfp_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,

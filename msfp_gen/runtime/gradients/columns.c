@@ -82,10 +82,10 @@ void msfp_support_columns(const msfp_point *at, const msfp_point_columns *dat, d
 MSFP_INLINE void foot_stage_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                                     const msfp_point_columns *dat, double *d)
 {
-    const double before[MSFP_FOOT_BEFORE_SIZE] = { at->foot[0], at->foot[1], at->foot_beta };
-    double dbefore[MSFP_FOOT_BEFORE_SIZE * C];
-    memcpy(dbefore + MSFP_FOOT_BEFORE_Y * C, dat->foot, sizeof dat->foot);
-    memcpy(dbefore + MSFP_FOOT_BEFORE_BETA * C, dat->foot_beta, sizeof dat->foot_beta);
+    const double before[MSFP_FOOT_PREVIOUS_SIZE] = { at->foot[0], at->foot[1], at->foot_beta };
+    double dbefore[MSFP_FOOT_PREVIOUS_SIZE * C];
+    memcpy(dbefore + MSFP_FOOT_PREVIOUS_Y * C, dat->foot, sizeof dat->foot);
+    memcpy(dbefore + MSFP_FOOT_PREVIOUS_BETA * C, dat->foot_beta, sizeof dat->foot_beta);
     if (msfp_top_is_sprung(p))
         msfp_spring_stage_direction(p->top, before, dp->top, dbefore, d);
     else
@@ -145,11 +145,12 @@ MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_param
     motion_columns(p, dp, w, &s, &ds, d);
     top_columns(p, dp, w, &s, &ds, d);
     for (int j = 0; j < NB; ++j) {
-        memcpy(ds.before[j] + MSFP_BEFORE_Y * C, dat->f[j], MSFP_SHEAR_SIZE * sizeof dat->f[j][0]);
-        memcpy(ds.before[j] + MSFP_BEFORE_BETA * C, dat->beta, sizeof dat->beta);
+        memcpy(ds.friction_previous[j] + MSFP_FRICTION_PREVIOUS_Y * C, dat->f[j],
+               MSFP_FRICTION_FORCE_SIZE * sizeof dat->f[j][0]);
+        memcpy(ds.friction_previous[j] + MSFP_FRICTION_PREVIOUS_BETA * C, dat->beta, sizeof dat->beta);
 #if MSFP_MEMORY
-        memcpy(ds.before[j] + MSFP_BEFORE_PAST * C, dat->past[j], sizeof dat->past[j]);
-        memcpy(ds.before[j] + MSFP_BEFORE_GAIN * C, dat->gain, sizeof dat->gain);
+        memcpy(ds.friction_previous[j] + MSFP_FRICTION_PREVIOUS_PAST * C, dat->past[j], sizeof dat->past[j]);
+        memcpy(ds.friction_previous[j] + MSFP_FRICTION_PREVIOUS_GAIN * C, dat->gain, sizeof dat->gain);
 #endif
     }
     msfp_forces_directions(p, dp, w, d, &s, &ds);
@@ -199,7 +200,7 @@ MSFP_WIDE void msfp_solve_columns(const double *restrict factors, const int *res
 MSFP_WIDE void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[NB][2], msfp_columns f[NB][2])
 {
     for (int j = 0; j < NB; ++j)
-        for (int i = 0; i < MSFP_SHEAR_SIZE; ++i) {
+        for (int i = 0; i < MSFP_FRICTION_FORCE_SIZE; ++i) {
             memcpy(df[j][i], d->contact[j] + (MSFP_CONTACT_DY + i) * C, sizeof df[j][i]);
             if (f)
                 memcpy(f[j][i], d->contact[j] + (MSFP_CONTACT_Y + i) * C, sizeof f[j][i]);

@@ -15,7 +15,7 @@
 
 enum {
     LANES = MSFP_LANES,
-    FRICTION = MSFP_SHEAR_SIZE,
+    FRICTION = MSFP_FRICTION_FORCE_SIZE,
     UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns of a contact: g, and mu where it follows a law */
     RESULTS = MSFP_CONTACT_RESULTS,
     INPUTS = MSFP_CONTACT_INPUTS,  /* the unknowns come last */
@@ -39,10 +39,11 @@ MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, dou
         MSFP_UNROLL
         for (int i = 0; i < INPUTS; ++i) {
             const int stage = r < FRICTION && input[i].block == STAGE, given = i < GIVEN;
-            const double past = stage && input[i].index == MSFP_STAGE_Y + r, own = given ? past : -(i - GIVEN == r);
+            const double past = stage && input[i].index == MSFP_FRICTION_STAGE_Y + r;
+            const double own = given ? past : -(i - GIVEN == r);
             for (int s = 0; s < LANES; ++s) {
                 const double slope = (r < FRICTION ? tau[s] : 1.0) * jacobian[MOMENT + r][i][s] + own +
-                                     (stage && input[i].index == MSFP_STAGE_TAU ? rates[r * LANES + s] : 0.0);
+                                     (stage && input[i].index == MSFP_FRICTION_STAGE_TAU ? rates[r * LANES + s] : 0.0);
                 a[r][i][s] = given ? slope : -slope;
             }
         }
@@ -74,15 +75,16 @@ MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, dou
 MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_stage_weights *weights, const msfp_work *w,
                                 const double g[MSFP_NB][2], int rows, msfp_slopes *slopes)
 {
-    double stage[MSFP_STAGE_SIZE * LANES], contact_frame[MSFP_CONTACT_FRAME_SIZE * LANES], force[FRICTION * LANES];
+    double stage[MSFP_FRICTION_STAGE_SIZE * LANES], contact_frame[MSFP_CONTACT_FRAME_SIZE * LANES],
+        force[FRICTION * LANES];
     double out[MSFP_CONTACT_SIZE * LANES], jacobian[RESULTS][INPUTS][LANES];
 #if MSFP_LAW
     double x[MSFP_COEFFICIENT_SIZE * LANES];
 #endif
     for (int s = 0; s < LANES; ++s) {
         const int j = s < MSFP_NB ? s : MSFP_NB - 1;
-        for (int i = 0; i < MSFP_STAGE_SIZE; ++i)
-            stage[i * LANES + s] = w->stage[j][i];
+        for (int i = 0; i < MSFP_FRICTION_STAGE_SIZE; ++i)
+            stage[i * LANES + s] = w->friction_stage[j][i];
         for (int i = 0; i < MSFP_CONTACT_FRAME_SIZE; ++i)
             contact_frame[i * LANES + s] = w->contact_frame[j][i];
         for (int i = 0; i < FRICTION; ++i)
@@ -102,7 +104,7 @@ MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_stage_weigh
 #else
     (void)weights;
 #endif
-    eliminate(out + MSFP_CONTACT_DY * LANES, stage + MSFP_STAGE_TAU * LANES, rows, jacobian, slopes->of);
+    eliminate(out + MSFP_CONTACT_DY * LANES, stage + MSFP_FRICTION_STAGE_TAU * LANES, rows, jacobian, slopes->of);
 }
 
 MSFP_WIDE void msfp_contact_slopes(const msfp_parameters *p, const msfp_stage_weights *weights, const msfp_work *w,
@@ -163,7 +165,7 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
                                  const msfp_stage_weights *weights, const msfp_point_columns *dat, const msfp_work *w,
                                  const msfp_slopes *slopes, int j, int rows, msfp_work_columns *d)
 {
-    double *dstage = d->stage[j], unknowns[UNKNOWNS * C];
+    double *dstage = d->friction_stage[j], unknowns[UNKNOWNS * C];
     const double *const blocks[] = { dp->surface[j], dstage, d->contact_frame[j], unknowns, unknowns + FRICTION * C },
                         *inputs[INPUTS];
     MSFP_UNROLL
@@ -171,13 +173,14 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
         inputs[i] = blocks[input[i].block] + input[i].index * C;
 #if MSFP_CLOSED_FORM
     if (weights->closed_form) {
-        double dslid[MSFP_SLID_SIZE * C];
-        msfp_slid_friction_direction(p->surface[j], weights->slip[j], w->contact_frame[j], dp->surface[j], dat->slip[j],
-                                     d->contact_frame[j], dslid);
-        memset(dstage, 0, sizeof d->stage[j]);
-        memcpy(dstage + MSFP_STAGE_Y * C, dslid + MSFP_SLID_Y * C, sizeof(msfp_columns));
-        memcpy(dstage + MSFP_STAGE_TAU * C, dp->surface[j] + MSFP_SURFACE_PARAMETERS_TD * C, sizeof(msfp_columns));
-        memcpy(unknowns, dslid + MSFP_SLID_G * C, sizeof(msfp_columns));
+        double dslid[MSFP_FRICTION_END_SIZE * C];
+        msfp_friction_after_slip_direction(p->surface[j], weights->slip[j], w->contact_frame[j], dp->surface[j],
+                                           dat->slip[j], d->contact_frame[j], dslid);
+        memset(dstage, 0, sizeof d->friction_stage[j]);
+        memcpy(dstage + MSFP_FRICTION_STAGE_Y * C, dslid + MSFP_FRICTION_END_Y * C, sizeof(msfp_columns));
+        memcpy(dstage + MSFP_FRICTION_STAGE_TAU * C, dp->surface[j] + MSFP_SURFACE_PARAMETERS_TD * C,
+               sizeof(msfp_columns));
+        memcpy(unknowns, dslid + MSFP_FRICTION_END_G * C, sizeof(msfp_columns));
         results_columns(slopes, inputs, INPUTS, rows, j, d->contact[j]);
         return;
     }

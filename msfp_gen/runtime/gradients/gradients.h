@@ -42,7 +42,8 @@ typedef struct {
     double x[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_COLUMNS], body[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_COLUMNS];
     double force[MSFP_NB + 1][MSFP_FORCE_SIZE * MSFP_COLUMNS], moment[MSFP_NB + 1][MSFP_MOMENT_SIZE * MSFP_COLUMNS];
     double contact_frame[MSFP_NB][MSFP_CONTACT_FRAME_SIZE * MSFP_COLUMNS],
-        stage[MSFP_NB][MSFP_STAGE_SIZE * MSFP_COLUMNS], contact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_COLUMNS];
+        friction_stage[MSFP_NB][MSFP_FRICTION_STAGE_SIZE * MSFP_COLUMNS],
+        contact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_COLUMNS];
     double rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_COLUMNS], foot[MSFP_FOOT_SIZE * MSFP_COLUMNS];
     double lock[MSFP_NB][MSFP_LOCK_SIZE * MSFP_COLUMNS];
 #if MSFP_UPLIFT
@@ -109,8 +110,8 @@ void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns
 void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                          const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
                          msfp_columns *row);
-/* The block `closed_rim` of surface j; where its gap is closed with columns. */
-void msfp_closed_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+/* The block `rim_motion` of surface j; where its gap is closed with columns. */
+void msfp_rim_motion_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
                              const msfp_work_columns *d, int j, double *closed, double *dclosed);
 /* Value of what decides an event of surface j, and its columns: the compression of its contact for lift-off and landing,
  * otherwise the gap of its rim [m]. kind: of the event. */

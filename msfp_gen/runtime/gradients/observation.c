@@ -98,7 +98,7 @@ double msfp_event_columns(const msfp_parameters *p, const msfp_parameter_columns
 #endif
 }
 
-void msfp_closed_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+void msfp_rim_motion_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
                              const msfp_work_columns *d, int j, double *closed, double *dclosed)
 {
     msfp_gap_of_rim(w, j, closed);
@@ -111,8 +111,8 @@ void msfp_closed_rim_columns(const msfp_parameters *p, const msfp_parameter_colu
         msfp_rim_columns(p, dp, w, j, d, own);
         rim = own;
     }
-    memcpy(dclosed + MSFP_CLOSED_RIM_G * C, rim + MSFP_RIM_G * C, C * sizeof *dclosed);
-    memcpy(dclosed + MSFP_CLOSED_RIM_DG * C, rim + MSFP_RIM_DG * C, C * sizeof *dclosed);
+    memcpy(dclosed + MSFP_RIM_MOTION_G * C, rim + MSFP_RIM_G * C, C * sizeof *dclosed);
+    memcpy(dclosed + MSFP_RIM_MOTION_DG * C, rim + MSFP_RIM_DG * C, C * sizeof *dclosed);
 #else
     (void)p;
     (void)dp;

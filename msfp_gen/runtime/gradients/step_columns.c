@@ -108,11 +108,11 @@ MSFP_INLINE void stage_state(msfp_run *run, msfp_parameter_batch *batch, int i, 
     memcpy(to->q, dat->q, sizeof to->q);
     memcpy(to->v, dat->v, sizeof to->v);
     memcpy(to->a, dat->a, sizeof to->a);
-    if (MSFP_SHEAR_SIZE < 2)
+    if (MSFP_FRICTION_FORCE_SIZE < 2)
         memset(to->df, 0, sizeof to->df);
     msfp_friction_columns(&batch->work, to->df, NULL);
     for (int j = 0; j < NB; ++j)
-        for (int d = 0; d < MSFP_SHEAR_SIZE; ++d)
+        for (int d = 0; d < MSFP_FRICTION_FORCE_SIZE; ++d)
             add_rates(w->drates[j][d], x, to->df[j][d]);
     memcpy(to->f, dat->f, sizeof to->f);
     msfp_add_columns(to->f[0], to->df[0], stage->beta, 2 * NB);
@@ -131,7 +131,7 @@ MSFP_INLINE void stage_state(msfp_run *run, msfp_parameter_batch *batch, int i, 
     msfp_columns source[NB];
     for (int j = 0; j < NB; ++j) {
         memcpy(source[j], batch->work.contact[j] + MSFP_CONTACT_SOURCE * C, sizeof source[j]);
-        add_rates(w->drates[j][MSFP_SHEAR_SIZE], x, source[j]);
+        add_rates(w->drates[j][MSFP_FRICTION_FORCE_SIZE], x, source[j]);
     }
     msfp_memory_state_columns(&stage_history->state[i], from, (const msfp_columns *)source, stage->beta, dat->beta, to);
 #endif

@@ -109,9 +109,10 @@ static void point(const state_columns *known, double beta, state_columns *stage,
 static void known_of_stage(const state_columns *known, double beta, msfp_by_ends *d)
 {
     for (int j = 0; j < NB; ++j) {
-        memcpy(d->before[j] + MSFP_BEFORE_Y * W, known->f[j], MSFP_SHEAR_SIZE * sizeof(columns));
+        memcpy(d->friction_previous[j] + MSFP_FRICTION_PREVIOUS_Y * W, known->f[j],
+               MSFP_FRICTION_FORCE_SIZE * sizeof(columns));
 #if MSFP_MEMORY
-        msfp_memory_past(known->memory[j][0], beta, W, d->before[j] + MSFP_BEFORE_PAST * W);
+        msfp_memory_past(known->memory[j][0], beta, W, d->friction_previous[j] + MSFP_FRICTION_PREVIOUS_PAST * W);
 #endif
     }
     for (int c = 0; c < W; ++c)
@@ -125,7 +126,7 @@ static void rest_of_stage(const state_columns *known, double beta, const msfp_by
     memcpy(stage->f, known->f, sizeof stage->f);
     memcpy(stage->foot, known->foot, sizeof stage->foot);
     for (int j = 0; j < NB; ++j) {
-        memcpy(stage->df[j], d->contact[j] + MSFP_CONTACT_DY * W, MSFP_SHEAR_SIZE * sizeof(columns));
+        memcpy(stage->df[j], d->contact[j] + MSFP_CONTACT_DY * W, MSFP_FRICTION_FORCE_SIZE * sizeof(columns));
 #if MSFP_MEMORY
         msfp_memory_stage(known->memory[j][0], d->contact[j] + MSFP_CONTACT_SOURCE * W, beta, W, stage->memory[j][0],
                           stage->dmemory[j][0]);

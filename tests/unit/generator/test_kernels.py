@@ -22,7 +22,7 @@ from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.specification.layout import ModelSpec
 
 QUASISTATIC = {"dimension": "planar", "sliders": "massless", "rims": False}
-SHOWN = ("slid_friction", "slip_work")
+SHOWN = ("friction_after_slip", "slip_work")
 
 
 class Kernels:
@@ -162,13 +162,13 @@ def test_friction_after_the_slip_of_a_step(friction: Friction, Y: float) -> None
             "s": dict(zip(("Y", "turn", "beta"), map(float, at), strict=False)),
             "loc": {"dwy": rate},
         }
-        found, want = kernels("slid_friction", **given), slid(*at)
+        found, want = kernels("friction_after_slip", **given), slid(*at)
         assert (found["Y"], found["g"]) == pytest.approx(tuple(map(float, want)), abs=2e-15)
         if abs(Y) == 1.0 or rate == 0.0 or abs(abs(want[1]) - 1) < 1e-9:
             continue
         for i, (alias, name) in enumerate((("s", "Y"), ("s", "turn"), ("s", "beta"), ("loc", "dwy"))):
             low, high = (slid(*at[:i], at[i] + step, *at[i + 1 :]) for step in (-mp.mpf("1e-9"), mp.mpf("1e-9")))
-            slopes = kernels.slopes("slid_friction", alias, name, **given)
+            slopes = kernels.slopes("friction_after_slip", alias, name, **given)
             expected = [float((b - a) / mp.mpf("2e-9")) for a, b in zip(low, high, strict=True)]
             assert (slopes["Y"], slopes["g"]) == pytest.approx(expected, rel=1e-9, abs=1e-9), (alias, name)
 
@@ -199,8 +199,8 @@ def test_friction_at_rest_is_elastic(friction: Friction) -> None:
     kernels, _ = friction
     for Y in (-0.5, 0.5):
         given = {"par": SURFACE, "s": {"Y": Y}}
-        assert kernels("slid_friction", **given) == {"Y": Y, "g": Y}
-        assert kernels.slopes("slid_friction", "s", "turn", **given)["Y"] == pytest.approx(PER_TURN, rel=1e-15)
+        assert kernels("friction_after_slip", **given) == {"Y": Y, "g": Y}
+        assert kernels.slopes("friction_after_slip", "s", "turn", **given)["Y"] == pytest.approx(PER_TURN, rel=1e-15)
 
 
 @pytest.fixture(scope="module")

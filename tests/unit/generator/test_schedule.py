@@ -102,11 +102,11 @@ def test_every_list_is_written_before_it_is_read(
     effects: dict[str, object], schedule: Callable[[Effects], Schedule]
 ) -> None:
     known = {"body_parameters", "surface_parameters", "top_parameters", "frame", "x", "load_force", "load_moment"}
-    known |= {"foot_stage", "upright", "coefficient", "unknowns", "friction", "before"}
+    known |= {"foot_stage", "upright", "coefficient", "unknowns", "friction", "friction_previous"}
     for call in calls_of(passes_of(schedule(Effects(**effects)))):  # type: ignore[arg-type]
         reads = {place.partition("[")[0] for place in call.reads}
         if isinstance(call.by, Solve):
-            reads -= {"shear"}  # the runtime fills it where it solves for friction
+            reads -= {"friction_force"}  # the runtime fills it where it solves for friction
         assert reads <= known, call
         known |= {place.partition("[")[0] for place in call.writes}
 
