@@ -162,7 +162,8 @@ def contacts() -> None:
         faces = scene.bearing.arrays()["rim_radius"][
             [scene.bearing.slider(j) for j in range(scene.bearing.layout.surfaces)]
         ]
-        shares = (contact_offsets(scene.bearing, simulate(scene).history) / faces).max(axis=0)
+        history = simulate(scene).history
+        shares = (contact_offsets(scene.bearing, history.contact_angles, history.tilt_angles) / faces).max(axis=0)
         print(f"| {name} | " + ", ".join(f"{share:.2f}" for share in shares) + " |", flush=True)
 
 

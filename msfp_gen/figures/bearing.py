@@ -350,7 +350,9 @@ def plot_force_path(result: Result, path: str | Path | None = None, *, time: flo
 def eccentricity(result: Result) -> Array:
     """Distance of every contact from the axis of its slider [m], shape (T, n-1); NaN while the surface is separated."""
     history = result.history
-    return np.where(history.separated, np.nan, contact_offsets(result.scene.bearing, history))
+    return np.where(
+        history.separated, np.nan, contact_offsets(result.scene.bearing, history.contact_angles, history.tilt_angles)
+    )
 
 
 def _draw_offsets(figure: SubFigure, result: Result) -> None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.results.history import History
 from msfp_gen.scene.bearing import Bearing
 
 if TYPE_CHECKING:
@@ -98,14 +97,19 @@ def body_positions(bearing: Bearing, basis: Array, separation: Array) -> tuple[A
     return bottom, top, centre
 
 
-def contact_offsets(bearing: Bearing, history: History) -> Array:
+def contact_offsets(bearing: Bearing, contact_angles: Array, tilt_angles: Array) -> Array:
     """Distance of the contact point (3.14) from the axis of the slider, ndarray, shape (T, n-1) [m].
 
     The normal force of a surface acts there. Beyond the radius of the slider's face it could not.
+
+    Args:
+        bearing: the bearing.
+        contact_angles: of a history, shape (T, n-1, 2) [rad].
+        tilt_angles: of a history, shape (T, n-1, 3) [rad].
     """
-    upright = np.broadcast_to(np.eye(3), (*history.contact_angles.shape[:-1], 3, 3))
-    normal = _rotated(history.contact_angles, upright)[..., 2, :]  # t~_3 (3.13), in the basis of the body below
-    above = _rotated(history.tilt_angles[..., :2], upright)[..., 2, :]
+    upright = np.broadcast_to(np.eye(3), (*contact_angles.shape[:-1], 3, 3))
+    normal = _rotated(contact_angles, upright)[..., 2, :]  # t~_3 (3.13), in the basis of the body below
+    above = _rotated(tilt_angles[..., :2], upright)[..., 2, :]
     concave_up = np.array(bearing.layout.signs)[:, None] > 0
     offsets: Array = np.linalg.norm(np.cross(normal, np.where(concave_up, above, upright[..., 2, :])), axis=-1)
     return offsets * bearing.arrays()["radius"]

@@ -50,7 +50,7 @@ WHERE = {
 }
 AFTER = {place for _, place in WHERE if place.endswith(("\n", "= ("))}
 SCENE = """
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from msfp_gen import Effects, load_scene
 scene = load_scene("single-articulated-push")
 effects = Effects(friction="pressure", bouc_wen="rounded", dimension="planar")
@@ -129,7 +129,7 @@ def test_a_new_effect_is_accepted_wherever_effects_are(extended: Path, tmp_path:
     out = run(
         extended,
         f"""
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from msfp_gen import Auto, Effects, load_scene
 from msfp_gen.cli import main
 from msfp_gen.generator.interface import effects_text
@@ -192,7 +192,7 @@ def test_the_law_with_a_state_of_its_own_runs(extended: Path) -> None:
     run(
         extended,
         """
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import numpy as np
 from msfp_gen import Effects, Motion, load_scene, simulate
 scene = load_scene("single-articulated-push")
@@ -227,8 +227,7 @@ def test_the_seal_resists_spin(extended: Path) -> None:
         f"""
 import sys
 sys.path[:0] = [{str(extended / "tests")!r}, {str(ROOT / "tests")!r}]
-from dataclasses import replace
-from types import SimpleNamespace
+from dataclasses import dataclass, replace
 import numpy as np
 from reference import forces, stack
 from support import bearing_of, model_of
@@ -237,8 +236,11 @@ from msfp_gen import Effects, InputError, load_scene, simulate
 from msfp_gen.scene.scene_fields import InitialState
 assert "seal" in forces.DRILLING
 values, state, h, load = sensible((3, 1, 1), 0)
-values = SimpleNamespace(**vars(values))
-values.surfaces = [SimpleNamespace(**vars(each), seal_damping=40.0 * k) for k, each in enumerate(values.surfaces, 1)]
+@dataclass(frozen=True)
+class Sealed(type(values.surfaces[0])):
+    seal_damping: float = 0.0
+surfaces = [Sealed(**vars(each), seal_damping=40.0 * k) for k, each in enumerate(values.surfaces, 1)]
+values = replace(values, surfaces=tuple(surfaces))
 model, bearing = model_of((3, 1, 1), spin="seal"), bearing_of(values)
 still = replace(state, a=np.zeros_like(state.a))
 for resisted in (True, False):

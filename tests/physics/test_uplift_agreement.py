@@ -57,7 +57,7 @@ def test_a_contact_outside_the_face_is_noted():
     whole, tipping = simulate(scene), simulate(narrow)
     assert not [note for note in whole.notes if note.kind == "footprint"]
     note = next(note for note in tipping.notes if note.kind == "footprint")
-    offset = contact_offsets(narrow.bearing, tipping.history)
+    offset = contact_offsets(narrow.bearing, tipping.history.contact_angles, tipping.history.tilt_angles)
     assert note.value == pytest.approx(offset[:, note.surface - 1].max()) and 0.010 < note.value < 0.020
     assert "uplift" in note.text
 

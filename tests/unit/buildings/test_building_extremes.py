@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,8 +86,7 @@ def test_places_of_contacts_are_those_of_the_rows(monkeypatch: pytest.MonkeyPatc
         pass
     rows, extremes = unpacked(run), run.extremes
     for index in range(4):
-        history = SimpleNamespace(contact_angles=rows[f"angles {index}"], tilt_angles=rows[f"q {index}"])
-        offsets = contact_offsets(BEARING, history)
+        offsets = contact_offsets(BEARING, rows[f"angles {index}"], rows[f"q {index}"])
         assert extremes.contact_offset[index] == pytest.approx(offsets.max(axis=0), rel=1e-3)
         times = rows["time"][offsets.argmax(axis=0)]
         assert extremes.times["contact_offset"][index] == pytest.approx(times, abs=2e-3)

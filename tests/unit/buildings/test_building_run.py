@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from time import sleep
-from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from support.buildings import BEARING, INTERFACE, LOAD, MOTION, frame, scene
 
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, InputError, Motion, RunError, simulate
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.run import result_of, start_run
+from msfp_gen.buildings.run import CompiledRun, result_of, start_run
 from msfp_gen.simulation import checkpoint
 
 EVENTFUL = scene(frame(), duration=0.8)
@@ -165,9 +165,8 @@ def test_a_run_that_fails_before_its_first_row_has_no_result(monkeypatch):
     """A result without rows would have no summary and no figure."""
 
     def failed(made: BuildingScene) -> Any:
-        compiled = SimpleNamespace(
-            rows=(), row_count=0, status=("newton", 1, 0, 0.0), time=0.0, advance=lambda steps: False
-        )
+        state = {"rows": (), "row_count": 0, "status": ("newton", 1, 0, 0.0), "time": 0.0}
+        compiled = Mock(spec_set=CompiledRun, advance=lambda steps: False, **state)
         return replace(start_run(made), run=compiled)
 
     monkeypatch.setattr("msfp_gen.buildings.run.start_run", failed)
