@@ -223,8 +223,7 @@ def compile_extension(
         chains.insert(0, _wrapper_steps(wrapper, compiler, include))
 
     def run(step: Step) -> None:
-        # Flags of the user may write more than the object.
-        if shared is None or FLAGS["user"] or step.subject not in units:
+        if step.subject not in units:
             log.run(step)
         else:
             compile_once(step.subject, compiler, c_flags, log, shared)
@@ -327,17 +326,20 @@ def compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> Step:
     return Step(name, (*compiler.command, *flags, "-c", name, "-o", object_file(name)))
 
 
-def compile_once(name: str, compiler: Compiler, flags: Sequence[str], log: Log, shared: Path) -> None:
+def compile_once(name: str, compiler: Compiler, flags: Sequence[str], log: Log, shared: Path | None) -> None:
     """Compile one C file, or take the object of the same preprocessed text by the same compiler from `shared`.
 
     Most files of the runtime read of a model its dimensions alone, and an edit of one leaves the text of the others.
     """
+    if shared is None or FLAGS["user"]:  # flags of the user may write more than the object
+        log.run(compile_step(name, compiler, flags))
+        return
     text, target = log.folder / f"{name}.i", log.folder / object_file(name)
-    log.run(Step(name, (*compiler.command, *flags, "-E", "-P", name, "-o", text.name)))
+    log.run(Step(name, (*compiler.command, *flags, "-E", "-P", name, "-o", f"{name}.i")))
     if not text.is_file():  # no C compiler, which is named where it has linked nothing
         log.run(compile_step(name, compiler, flags))
         return
-    inputs = f"{compiler.command} {compiler.path} {compiler.version} {flags}\0{name}\0".encode()
+    inputs = f"{compiler.command} {compiler.path} {compiler.version} {flags}\0{target.name}\0".encode()
     path = shared / f"{hashlib.sha256(inputs + text.read_bytes()).hexdigest()[:40]}.o"
     text.unlink()
     known = read_kept(path)

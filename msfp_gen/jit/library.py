@@ -16,12 +16,14 @@ from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.output import write_text
 from msfp_gen.generator.interface import ABI_VERSION, model_name
 from msfp_gen.jit.build import runtime_sources
+from msfp_gen.jit.cache import objects_folder
 from msfp_gen.jit.compiler import (
     FLAGS,
     ZIG_OPTIONS,
     Compiler,
     Log,
     Step,
+    compile_once,
     compile_step,
     find_compiler,
     object_file,
@@ -108,9 +110,13 @@ def build_shared(
 def _compile(
     units: Sequence[str], what: str, compiler: Compiler, log: Log, progress: Callable[[str, float], None]
 ) -> list[str]:
-    """Compile C files in the folder of a log; returns the object files."""
+    """Compile C files in the folder of a log, those that another library has not; returns the object files."""
     flags = (*FLAGS["c"], *FLAGS["user"])
-    for done in run_parallel([[compile_step(name, compiler, flags)] for name in units], log.run):
+
+    def run(step: Step) -> None:
+        compile_once(step.subject, compiler, flags, log, objects_folder())
+
+    for done in run_parallel([[compile_step(name, compiler, flags)] for name in units], run):
         share = GENERATION_SHARE + (1 - GENERATION_SHARE) * done / len(units)
         progress(f"compiling {what} ({done} of {len(units)} files)", share)
     return [object_file(name) for name in units]

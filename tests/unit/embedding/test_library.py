@@ -33,7 +33,7 @@ from msfp_gen.embedding import values
 from msfp_gen.embedding.library import export_library
 from msfp_gen.generator.interface import ABI_VERSION, model_name
 from msfp_gen.jit.compiler import find_compiler
-from msfp_gen.jit.library import BuiltLibrary, Platform
+from msfp_gen.jit.library import BuiltLibrary, Platform, build_library, find_platform
 from msfp_gen.simulation.start import start_run
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import ModelSpec
@@ -372,6 +372,14 @@ def test_every_line_of_the_fortran_files_fits(prefix: Path) -> None:
 
 
 # ---- what is refused, and what is left alone ---------------------------------------------------------------------
+
+
+def test_a_library_takes_the_objects_that_another_one_compiled(prefix: Path, tmp_path: Path) -> None:
+    """Of the planar (3,1,1), which is in the library of the prefix, nothing is compiled again."""
+    spec = ModelSpec(Layout(3, 1, 1), Effects(dimension="planar"))
+    build_library([spec], tmp_path, find_platform(None), lambda text, share: None)
+    commands = (tmp_path / "build.log").read_text(encoding="utf-8")
+    assert " -shared " in commands and " -c " not in commands
 
 
 @pytest.fixture
