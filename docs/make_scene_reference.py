@@ -13,7 +13,7 @@ from typing import Any
 from msfp_gen.buildings import file as buildings
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
 from msfp_gen.buildings.storey import BaseSlab, Soil, Storey
-from msfp_gen.common.fields import Choice, Quantity, Rule, ruled_fields
+from msfp_gen.common.fields import Choice, G, Quantity, Rule, ruled_fields
 from msfp_gen.common.tables import markdown_table
 from msfp_gen.motions.records import ScaleTo
 from msfp_gen.scene.bearing import Bearing, Body, Surface
@@ -71,7 +71,8 @@ MEANINGS = {
     "bodies": "One table for each moving body, from body 2 to the top plate.",
     "preset": "Name of a preset bearing; other keys change it. A list has one value for each surface or body.",
     "base_height": "Height of the base at its axis.",
-    "gravity": "Acceleration of gravity.",
+    "gravity": "Acceleration of gravity, by default of PEER 2017/07. The unit g of texts, records and figures is the"
+    f" standard gravity, {G}.",
     "base_rim_radius": "Radius of the edge of the base that meets a rim, where the base is a slider.",
     "base_rim_offset": "Distance of that edge from its upper face.",
     "base_centroid": "Centre of mass of the base above its bottom (3.2); no result of a run depends on it.",

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.fields import G
 from msfp_gen.figures.style import (
     COLOURS,
     FAINT,
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
 ORBIT = 0.42  # radius of the largest orbit in the plan, over the least distance of two bearings
 ROUND = (1, 2, 5)  # magnifications are these times a power of ten
 LABELLED = 24  # bearings of a plan that are labelled, at most
-G = 9.80665  # of accelerations in figures [m/s^2]
 AXES = range(3)
 
 

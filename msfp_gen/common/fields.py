@@ -1,7 +1,8 @@
 """Validation rules of input fields, written as annotations: one definition serves Python and scene files.
 
 A dataclass declares `radius: Annotated[float, Quantity("m", above=0)]` and calls `check_fields` in `__post_init__`. The
-reader of scene files builds its schema from the same annotations.
+reader of scene files builds its schema from the same annotations. Functions that take quantities name their units in
+`quantities`.
 
 Texts with units become SI: "112 kN" becomes 112000.0. All other code uses SI only. Pint is slow to import, so it is
 imported only for a text with a unit. Pint would evaluate expressions, so a text must first match a small grammar of
@@ -13,15 +14,20 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from dataclasses import fields as dataclass_fields
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, wraps
+from inspect import signature
 from numbers import Integral, Real
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, ParamSpec, TypeVar, get_args, get_origin, get_type_hints
 
 from msfp_gen.common.errors import InputError
+
+P = ParamSpec("P")
+R = TypeVar("R")
+G = 9.80665  # standard gravity [m/s^2], the unit g of texts, records and figures, whatever the gravity of a bearing
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _TERM = r"[A-Za-zµμ°%_]+(?:(?:\^|\*\*)-?\d|[234])?[²³]?"
@@ -244,20 +250,53 @@ Rule = Quantity | Choice | Text | Notes
 
 
 def check_fields(instance: Any, path: str) -> None:
-    """Check every field of a frozen dataclass that has a rule, and replace its value by the normalised one.
+    """Check every field of a frozen dataclass that has a rule, and replace its value by the normalised one, in SI.
 
-    None is accepted where it is the default. Raises InputError that names `path.field`, the value and the remedy.
+    Texts with units are accepted, such as radius="39 in"; None is accepted where it is the default. Raises InputError
+    that names `path.field`, the value and the remedy.
     """
     for name, rule, default in ruled_fields(type(instance)):
         value = getattr(instance, name)
         if value is None and default is None:
             continue
         try:
-            parsed = rule.parse(value)
+            parsed = rule.parse(value, text=True)
         except ValueError as error:
             raise InputError(f"{path}.{name} = {value!r}: {error}") from None
         if parsed is not value:
             object.__setattr__(instance, name, parsed)
+
+
+def quantities(**units: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Decorate a function whose arguments of these names may be texts with a unit, alone or in lists, of this SI unit.
+
+    The function gets them in SI. Raises InputError that names the argument, the text and the remedy.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        names = list(signature(function).parameters)
+
+        @wraps(function)
+        def called(*args: P.args, **kwargs: P.kwargs) -> R:
+            given = [_in_si(name, value, units.get(name)) for name, value in zip(names, args, strict=False)]
+            named = {name: _in_si(name, value, units.get(name)) for name, value in kwargs.items()}
+            return function(*given, *args[len(names) :], **named)  # type: ignore[arg-type]
+
+        return called
+
+    return decorate
+
+
+def _in_si(name: str, value: object, unit: str | None) -> object:
+    """A value with the texts in it in SI, if it has a unit; lists and tuples of numbers are returned as they are."""
+    if unit is not None and isinstance(value, str):
+        try:
+            return to_si(value, unit)
+        except ValueError as error:
+            raise InputError(f"{name} = {value!r}: {error}") from None
+    if unit is not None and isinstance(value, list | tuple) and any(isinstance(x, str | list | tuple) for x in value):
+        return [_in_si(name, item, unit) for item in value]
+    return value
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
+from msfp_gen.common.fields import G
 from msfp_gen.figures.style import (
     COLOURS,
     FAINT,
@@ -29,7 +30,6 @@ from msfp_gen.figures.style import (
     subscript,
 )
 from msfp_gen.motions.records import Corrected, Record
-from msfp_gen.motions.records.record import G
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
-from msfp_gen.common.fields import require_type
+from msfp_gen.common.fields import quantities, require_type
 from msfp_gen.motions import piecewise, sources
 from msfp_gen.motions.checks import checked_pieces, number, numbers, order, positive, storable
 from msfp_gen.motions.piecewise import Metadata, Pieces
@@ -183,6 +183,7 @@ class Motion:
         end = [rotation.duration] if 0 < rotation.duration < self.duration else []
         return self + Motion(knots, pieces[inside], np.array(end), name=rotation.name)
 
+    @quantities(angle="rad")
     def rotated(self, angle: float) -> Motion:
         """The motion with its horizontal components rotated by `angle` [rad] about E3, from E1 towards E2.
 
@@ -200,6 +201,7 @@ class Motion:
         coefficients[:, 1] = s * self.coefficients[:, 0] + c * self.coefficients[:, 1]
         return replace(self, coefficients=coefficients)
 
+    @quantities(duration="s")
     def held(self, duration: float) -> Motion:
         """The motion followed by `duration` [s] without motion at its final position, for free vibration.
 
@@ -259,6 +261,7 @@ class Motion:
         return cls(pieces.knots, pieces.coefficients, max_step=pieces.max_step, name=name, metadata=pieces.metadata)
 
     @classmethod
+    @quantities(time="s", displacement="m", rotation="rad")
     def from_arrays(
         cls, time: ArrayLike, displacement: ArrayLike, rotation: ArrayLike | None = None, *, name: str = ""
     ) -> Motion:
@@ -277,6 +280,7 @@ class Motion:
         return cls._of(sources.from_displacement(time, displacement, rotation), name)
 
     @classmethod
+    @quantities(time="s", acceleration="m/s^2")
     def from_acceleration(cls, time: ArrayLike, acceleration: ArrayLike, *, name: str = "") -> Motion:
         """Motion from sampled accelerations, piecewise linear and integrated twice exactly from rest at zero.
 
@@ -288,6 +292,7 @@ class Motion:
         return cls._of(sources.from_acceleration(time, acceleration), name)
 
     @classmethod
+    @quantities(time="s", velocity="m/s")
     def from_velocity(cls, time: ArrayLike, velocity: ArrayLike, *, name: str = "") -> Motion:
         """Motion from sampled velocities, interpolated by cubic splines and integrated from zero displacement.
 
@@ -299,6 +304,7 @@ class Motion:
         return cls._of(sources.from_velocity(time, velocity), name)
 
     @classmethod
+    @quantities(amplitude="m", frequency="Hz", direction="rad", lead_in="s")
     def harmonic(
         cls,
         amplitude: float,
@@ -329,6 +335,7 @@ class Motion:
         return cls._of(sources.enveloped_sines(amplitude, sines, period, cycles, rise), name)
 
     @classmethod
+    @quantities(amplitude="m", angular_frequency="rad/s", lead_in="s")
     def circle(
         cls, amplitude: float, angular_frequency: float, *, cycles: float = 2.0, lead_in: float = 20.0, name: str = ""
     ) -> Motion:
@@ -346,6 +353,7 @@ class Motion:
         return cls._of(sources.enveloped_sines(amplitude, sines, period, cycles, lead_in), name)
 
     @classmethod
+    @quantities(amplitude="m", angular_frequency="rad/s", lead_in="s")
     def figure_eight(
         cls, amplitude: float, angular_frequency: float, *, cycles: float = 2.0, lead_in: float = 20.0, name: str = ""
     ) -> Motion:
@@ -363,6 +371,7 @@ class Motion:
         return cls._of(sources.enveloped_sines(amplitude, sines, period, cycles, lead_in), name)
 
     @classmethod
+    @quantities(acceleration="m/s^2", duration="s", direction="rad")
     def ramp(cls, acceleration: float, duration: float, *, direction: float = 0.0, name: str = "") -> Motion:
         """Constant acceleration from rest, u = acceleration t^2/2 (PEER 2017/07, section 4.1, with 0.1 m/s^2).
 
@@ -381,6 +390,7 @@ class Motion:
         return cls(knots, pieces, name=name, metadata={"source": "ramp", "acceleration": acceleration})
 
     @classmethod
+    @quantities(start="s", duration="s", corner="Hz", taper="s")
     def from_record(
         cls,
         record: Record,

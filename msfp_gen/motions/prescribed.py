@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
+from msfp_gen.common.fields import quantities
 from msfp_gen.motions import piecewise
 from msfp_gen.motions.checks import finite, increasing, number, numbers, order, positive, storable, vector
 from msfp_gen.motions.piecewise import ORDER, powers
@@ -166,16 +167,19 @@ class Load(Prescribed):
     MAY_JUMP: ClassVar[bool] = True
 
     @classmethod
+    @quantities(force="N", moment="N m")
     def constant(cls, force: ArrayLike, moment: ArrayLike = (0.0, 0.0, 0.0)) -> Load:
         """Constant load. force, moment: shape (3,), [N], [N m]."""
         return cls._constant(np.concatenate([vector("load.force", force), vector("load.moment", moment)]))
 
     @classmethod
+    @quantities(force="N", moment="N m", duration="s")
     def ramp(cls, force: ArrayLike, moment: ArrayLike = (0.0, 0.0, 0.0), *, duration: float) -> Load:
         """Smooth increase from zero to force, moment: shape (3,), [N], [N m], in `duration` [s]."""
         return cls._ramp(np.concatenate([vector("load.force", force), vector("load.moment", moment)]), duration)
 
     @classmethod
+    @quantities(force="N", moment="N m", frequency="Hz", phase="rad", lead_in="s")
     def harmonic(
         cls,
         force: ArrayLike,
@@ -200,6 +204,7 @@ class Load(Prescribed):
         return cls._harmonic(values, frequency, cycles, phase, lead_in)
 
     @classmethod
+    @quantities(time="s", force="N", moment="N m")
     def from_arrays(cls, time: ArrayLike, force: ArrayLike, moment: ArrayLike | None = None, *, name: str = "") -> Load:
         """Linear interpolation of samples.
 
@@ -237,16 +242,19 @@ class Rotation(Prescribed):
             raise InputError(f"rotation = {largest:.4g}: plates turn by less than 1 rad; give radians")
 
     @classmethod
+    @quantities(psi="rad", theta="rad")
     def constant(cls, psi: float = 0.0, theta: float = 0.0) -> Rotation:
         """Constant inclination psi, theta [rad] of a plate."""
         return cls._constant([psi, theta])
 
     @classmethod
+    @quantities(psi="rad", theta="rad", duration="s")
     def ramp(cls, psi: float = 0.0, theta: float = 0.0, *, duration: float) -> Rotation:
         """Smooth rotation from level to psi, theta [rad] in `duration` [s]."""
         return cls._ramp([psi, theta], duration)
 
     @classmethod
+    @quantities(psi="rad", theta="rad", frequency="Hz", phase="rad", lead_in="s")
     def harmonic(
         cls,
         psi: float = 0.0,
@@ -270,6 +278,7 @@ class Rotation(Prescribed):
         return cls._harmonic([psi, theta], frequency, cycles, phase, lead_in)
 
     @classmethod
+    @quantities(time="s", angles="rad")
     def from_arrays(cls, time: ArrayLike, angles: ArrayLike, *, name: str = "") -> Rotation:
         """Cubic spline with zero rates at both ends.
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
+from msfp_gen.common.fields import G
 from msfp_gen.common.tables import Table
 from msfp_gen.common.version import __version__
 from msfp_gen.figures.sheet import plot_sheet
@@ -23,7 +24,6 @@ from msfp_gen.figures.style import CASE_COLOURS, COLOURS, FAINT, INK, THIN, dist
 from msfp_gen.report.frames import picture, render, write_page
 from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of
 from msfp_gen.scene.explain import explain
-from msfp_gen.scene.plausibility import G
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.sheet import Sheet
 from msfp_gen.studies.bounding import CASES, SuiteBounds, load_suite_bounds

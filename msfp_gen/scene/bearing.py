@@ -114,8 +114,9 @@ _SURFACE_ARRAYS = tuple(  # the stiffness of unilateral contacts depends on the 
 class Bearing:
     """A stack of bodies with `layout`: n - 1 surfaces, and the bodies 2..n above the base (body 1), bottom first.
 
-    base_height: l_1 [m]. gravity: g [m/s^2]. base_rim_radius, base_rim_offset: r_1, p_1, used where the first surface
-    is concave down [m]. base_centroid: z_1, which only defines the named point r_1 (3.2); None: half the height [m].
+    base_height: l_1 [m]. gravity: g, by default of PEER 2017/07; the unit g of texts is 9.80665 [m/s^2].
+    base_rim_radius, base_rim_offset: r_1, p_1, used where the first surface is concave down [m].
+    base_centroid: z_1, which only defines the named point r_1 (3.2); None: half the height [m].
     friction_lower, friction_upper: coefficients of the surfaces at the bounds of a bounding analysis, bottom first;
     None: it needs factors.
     friction_at: "pivot" where the coefficients of `surfaces`, and their bounds, are those of a data sheet; the bearing

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from msfp_gen.common.fields import G
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import load_at_rest
@@ -25,7 +26,6 @@ from msfp_gen.specification.layout import Auto, Effects
 
 Doubt = tuple[int, float, str]  # number of the surface, 0: none; the value; the text
 Range = tuple[float, float]
-G = 9.80665  # standard gravity [m/s^2]
 LEAST_DAMPING = 0.01  # ratio of a vibration on vertical springs below which what it adds depends on the tolerance
 USUAL_DAMPING = 0.02  # ratio that is named as the remedy
 RIM_LOAD = 1 / 3  # of the load at rest, which a rim must bear

@@ -11,10 +11,10 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
+from msfp_gen.common.fields import G
 from msfp_gen.motions.checks import finite, positive
 from msfp_gen.motions.records.text import Lines
 
-G = 9.80665  # standard gravity [m/s^2], the unit g of records, independent of the gravity of a bearing
 COMPONENTS = ("E1", "E2", "E3")
 # Unit in the header of a record -> quantity and factor to SI. Case, blanks and a final full stop are ignored.
 UNITS: dict[str, tuple[str, float]] = {

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.fields import G
 from msfp_gen.common.tables import Table
 from msfp_gen.motions.records.correction import Corrected
-from msfp_gen.motions.records.record import COMPONENTS, G, Record
+from msfp_gen.motions.records.record import COMPONENTS, Record
 from msfp_gen.motions.records.spectrum import MEASURES, response_spectrum
 
 if TYPE_CHECKING:

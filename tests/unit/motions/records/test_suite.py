@@ -9,8 +9,8 @@ import pytest
 
 from msfp_gen import InputError, Motion, load_scene
 from msfp_gen.cli import main
+from msfp_gen.common.fields import G
 from msfp_gen.motions.records import Record, ScaleTo, response_spectrum, scaled_suite, write_csv
-from msfp_gen.motions.records.record import G
 from msfp_gen.results.result import load_result
 from msfp_gen.scene.file.loader import load_suite
 from msfp_gen.studies.sweep import variations, varied_field
