@@ -126,7 +126,7 @@ class Checkpoint:
         try:
             write(self.path, self._identity, [*self._earlier, self._saved(run)])
         except (OSError, MemoryError) as error:
-            reason = getattr(error, "strerror", None) or error or "no memory"
+            reason = getattr(error, "strerror", None) or str(error) or "no memory"
             warnings.warn(f"checkpoint {self.path} not written ({reason}); the run continues", RuntimeWarning, 2)
         now = time.monotonic()
         self._due = now + max(self._every, WRITE_INTERVAL * (now - start))
