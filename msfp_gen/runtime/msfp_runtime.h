@@ -361,10 +361,15 @@ struct msfp_run {
 #endif
     const double *jumps; /* times at which the base acceleration jumps, rising [s] */
     int jump_count;
+    const double *ends; /* of the steps, where they are prescribed [s] */
+    int end_count;
     msfp_options options;
     msfp_point reached; /* where the evaluation that ended the last step was made, base and load included */
     uint64_t identity;  /* of all that the run computes from; 0: of any scene */
     int stop, span;     /* indices into options.stops and options.span_ends: where a search by time begins */
+    msfp_row node_rows[MSFP_NODES + 2]; /* at the start of the last step, at its interpolation nodes, at its end */
+    int nodes_observed; /* whether they are */
+    int ringing;        /* whether the works of the last step are integrated as where rates ring (msfp_refine_works) */
     /* A snapshot holds what follows, down to `rows`: no pointers. What is above follows from the scene. */
     int next_jump;
     msfp_state now, next;
@@ -442,6 +447,8 @@ void msfp_run_free(msfp_run *run);
 /* ---- derivatives of a run with respect to parameters; docs/gradients.md ---- */
 /* Begin the derivatives of a run after msfp_run_start. Returns run->status. */
 int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *inputs);
+/* Release them. */
+void msfp_gradients_free(msfp_run *run);
 /* Derivatives of the rows, [row][parameter][MSFP_ROW_SIZE]; count: of the rows. */
 const double *msfp_gradient_rows(const msfp_run *run, size_t *count);
 /* Derivatives of time, displacement and top force of the events, [event][parameter][7]; count: of the events. */

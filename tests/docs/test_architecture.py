@@ -304,6 +304,15 @@ def test_no_files_of_c_call_each_other_in_a_circle(folder):
         left = {path: needs for path, needs in left.items() if path not in free}
 
 
+def test_gradients_follow_a_run_through_three_hooks():
+    """The rest of what they need are data of the run."""
+    below = [path for layer in LAYERS[:-1] for path in (RUNTIME / layer).iterdir()]
+    texts = [path.read_text(encoding="utf-8") for path in below]
+    called = re.findall(r"MSFP_HOOK\(run, (\w+)\(", "".join(texts))
+    assert set(called) == {"stage_solved", "step_accepted", "jumped"}
+    assert not [path.name for path, text in zip(below, texts, strict=True) if "run->gradients" in text]
+
+
 def test_names_of_runtime_files_are_unique():
     """Generated sources lie in one folder."""
     assert len({path.name for path in SOURCES}) == len(SOURCES)

@@ -99,8 +99,12 @@ int msfp_api_run_new(const msfp_scene *scene, msfp_run **run, const char **messa
 
 void msfp_api_run_free(msfp_run *run)
 {
-    if (run)
-        msfp_run_free(run);
+    if (!run)
+        return;
+#if MSFP_GRADIENTS
+    msfp_gradients_free(run);
+#endif
+    msfp_run_free(run);
     free(run);
 }
 

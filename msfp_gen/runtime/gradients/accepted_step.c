@@ -10,8 +10,7 @@ static const double slight_pull = 1e-3; /* of the normal force: a pull that does
 /* Whether the row of the end of the step enters what is recorded. */
 static int end_is_recorded(const msfp_run *run)
 {
-    const struct msfp_gradients *g = run->gradients;
-    return msfp_is_quasistatic(run) || run->row_count > g->row_count || g->extremes_taken;
+    return msfp_is_quasistatic(run) || run->row_count > run->gradients->row_count || msfp_step_has_extreme(run);
 }
 
 /* Factored tangents of the stages of the step, at the evaluations that solved them. */
@@ -70,11 +69,12 @@ static void step_columns(msfp_run *run, msfp_parameter_batch *batch)
         batch->next.t[c] = batch->now.t[c] + batch->h[c];
 }
 
-/* Columns of the accepted step, and of the rows inside it. rim: the surface whose rim is met or left at its end, -1:
+/* Columns of the accepted step, and of the rows inside it, up to row `rows` of the run. rim: the surface whose rim is met or left at its end, -1:
  * none. The step then ends where the gap is zero, so that its length depends on the parameters, but not its rows. */
-static int accepted_columns(msfp_run *run, int rim, int fixed)
+static int accepted_columns(msfp_run *run, size_t rows, int rim, int fixed)
 {
     struct msfp_gradients *g = run->gradients;
+    memset(g->recording.node_known, 0, sizeof g->recording.node_known);
     int status = factorise(run);
     if (status)
         return status;
@@ -83,8 +83,8 @@ static int accepted_columns(msfp_run *run, int rim, int fixed)
             g->batch[i].h[c] = fixed ? -g->batch[i].now.t[c] : 0.0;
         step_columns(run, &g->batch[i]);
     }
-    if (run->row_count > g->row_count)
-        status = msfp_record_rows_columns(run);
+    if (rows > g->row_count)
+        status = msfp_record_rows_columns(run, rows);
     for (int i = 0; i < g->batches && rim >= 0; ++i) {
         msfp_columns dt;
         msfp_event_time_columns(run, &g->batch[i], MSFP_EVENT_RIM_CONTACT, rim, dt);
@@ -122,7 +122,7 @@ static int take_step_to_event(msfp_run *run, int j, int meets)
  * last stages of its step may be beyond it, where rates of light sliders and of massless bodies have changed. The
  * columns are therefore those of a step that ends at the event, with the contact as it was before; where the damper of
  * a rim that is left would pull, those of the step as it was taken. */
-static int columns_to_event(msfp_run *run, int rim, int fixed, int meets)
+static int columns_to_event(msfp_run *run, size_t rows, int rim, int fixed, int meets)
 {
     struct msfp_gradients *g = run->gradients;
     int status;
@@ -134,8 +134,9 @@ static int columns_to_event(msfp_run *run, int rim, int fixed, int meets)
         status = msfp_step_implicit(run, run->next.t - run->now.t, &error);
     }
     if (!status)
-        status = accepted_columns(run, rim, fixed);
+        status = accepted_columns(run, rows, rim, fixed);
     *run = g->own;
+    memset(g->recording.node_known, 0, sizeof g->recording.node_known);
     g->event_time = run->next.t;
     return status;
 }
@@ -143,17 +144,28 @@ static int columns_to_event(msfp_run *run, int rim, int fixed, int meets)
 int msfp_accepted_step_columns(msfp_run *run, const double *before, const double *after)
 {
     struct msfp_gradients *g = run->gradients;
-    ++g->step;
     if (g->count == 0)
         return MSFP_OK;
-    const int prescribed = g->step_count > 0 || msfp_is_quasistatic(run);
+    const int stopped = run->event_count > g->event_count && run->events[run->event_count - 1].kind == MSFP_EVENT_STOP;
+    const int last_row = stopped && run->options.output_step > 0.0; /* the last row is that of the state at the end */
+    const size_t rows = run->row_count - last_row;
+    const int prescribed = run->end_count > 0 || msfp_is_quasistatic(run);
     const int rim = prescribed ? -1 : rim_at_end(run, before, after);
     const int fixed = prescribed || ends_at_fixed_time(run);
-    int status = rim < 0 ? accepted_columns(run, rim, fixed) : columns_to_event(run, rim, fixed, before[rim] > 0.0);
+    g->stage_history.state[0] = run->now;
+    int status = rim < 0 ? accepted_columns(run, rows, rim, fixed)
+                         : columns_to_event(run, rows, rim, fixed, before[rim] > 0.0);
     if (!status)
         status = msfp_record_extremes_columns(run);
-    for (int i = 0; i < g->batches && rim >= 0; ++i)
-        g->batch[i].end_known = 0; /* the next step starts after the event */
+    if (!status && last_row)
+        status = msfp_record_state_columns(run, 0);
+    for (int i = 0; i < g->batches; ++i) {
+        msfp_parameter_batch *batch = &g->batch[i];
+        batch->now = batch->next;
+        batch->start_known = batch->end_known && rim < 0; /* the next step starts after the event */
+        if (batch->start_known)
+            memcpy(batch->start_row, batch->end_row, sizeof batch->end_row);
+    }
     return status;
 }
 #endif

@@ -1,4 +1,5 @@
 /* extreme_columns.c: derivatives of the extremes of a run. */
+#include <math.h>
 #include <string.h>
 #include "gradients.h"
 
@@ -42,22 +43,28 @@ static const msfp_columns *row_at(msfp_run *run, msfp_parameter_batch *batch, do
     return (const msfp_columns *)d;
 }
 
+int msfp_step_has_extreme(const msfp_run *run)
+{
+    const double *time = (const double *)&run->extreme_times;
+    int found = 0;
+    for (int i = 0; i < MSFP_EXTREME_COUNT; ++i)
+        found |= time[i] > run->now.t;
+    return found;
+}
+
 void msfp_extremes_of_step(msfp_run *run, msfp_parameter_batch *batch)
 {
-    double share[MSFP_EXTREME_COUNT];
+    const double *time = (const double *)&run->extreme_times, now = run->now.t;
+    int done[MSFP_EXTREME_COUNT] = { 0 };
     msfp_row row;
-    if (!run->gradients->extremes_taken)
-        return;
-    memcpy(share, run->gradients->extreme_share, sizeof share);
     for (int i = 0; i < MSFP_EXTREME_COUNT; ++i) {
-        const double at = share[i];
-        if (at == MSFP_NOT_TAKEN)
+        if (done[i] || time[i] <= now)
             continue;
-        const msfp_columns *d = row_at(run, batch, at, &row);
+        const msfp_columns *d = row_at(run, batch, fmin(1.0, (time[i] - now) / (run->next.t - now)), &row);
         for (int k = i; k < MSFP_EXTREME_COUNT; ++k)
-            if (share[k] == at) {
+            if (time[k] == time[i]) {
                 take(run, batch, &row, d, k);
-                share[k] = MSFP_NOT_TAKEN;
+                done[k] = 1;
             }
     }
 }

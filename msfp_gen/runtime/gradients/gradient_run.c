@@ -93,58 +93,12 @@ static void fill_batch(const msfp_run *run, const msfp_gradient_inputs *in, int 
 
 /* ---- hooks ---- */
 
-static double prescribed_step(const msfp_run *run)
-{
-    const struct msfp_gradients *g = run->gradients;
-    return g->step < g->step_count ? g->steps[g->step] - run->now.t : 0.0;
-}
-
-static void stage_solved(msfp_run *run, int i, const msfp_stage *stage)
+static void stage_solved(msfp_run *run, int i, const msfp_stage *stage, const msfp_state *state)
 {
     msfp_stage_history *stage_history = &run->gradients->stage_history;
     stage_history->stage[i] = *stage;
+    stage_history->state[i] = *state;
     memcpy(&stage_history->work[i], &run->work, offsetof(msfp_work, dx)); /* without derivatives */
-}
-
-static void stages_ended(msfp_run *run, const msfp_stages *s, int ringing)
-{
-    memcpy(run->gradients->stage_history.state, s->stage, sizeof s->stage);
-    run->gradients->stage_history.ringing = ringing;
-}
-
-static void before_step(msfp_run *run)
-{
-    run->gradients->recording.known = 0;
-    for (int i = 0; i < MSFP_EXTREME_COUNT && run->gradients->extremes_taken; ++i)
-        run->gradients->extreme_share[i] = MSFP_NOT_TAKEN;
-    run->gradients->extremes_taken = 0;
-}
-
-static void extreme_taken(msfp_run *run, int index, double share)
-{
-    run->gradients->extreme_share[index] = share;
-    run->gradients->extremes_taken = 1;
-}
-
-static void step_accepted(msfp_run *run)
-{
-    for (int i = 0; i < run->gradients->batches; ++i) {
-        msfp_parameter_batch *batch = &run->gradients->batch[i];
-        batch->now = batch->next;
-        batch->start_known = batch->end_known;
-        if (batch->end_known)
-            memcpy(batch->start_row, batch->end_row, sizeof batch->end_row);
-    }
-}
-
-static msfp_observation *place_of_node(msfp_run *run, int index) { return &run->gradients->recording.node[index]; }
-
-static void node_observed(msfp_run *run, int index, const msfp_row *row)
-{
-    msfp_recording *r = &run->gradients->recording;
-    r->value[index] = *row;
-    r->sloped[index] = 0;
-    r->known = index == run->node_count + 1;
 }
 
 static int jumped(msfp_run *run)
@@ -157,13 +111,12 @@ static int jumped(msfp_run *run)
     return status;
 }
 
-static int last_row_written(msfp_run *run)
-{
-    return run->gradients->count ? msfp_record_present_columns(run, 0) : MSFP_OK;
-}
+static const struct msfp_hooks hooks = { stage_solved, msfp_accepted_step_columns, jumped };
 
-static void released(msfp_run *run)
+void msfp_gradients_free(msfp_run *run)
 {
+    if (!run->gradients)
+        return;
     free(run->gradients->batch);
     free(run->gradients->rows);
     free(run->gradients->events);
@@ -171,21 +124,6 @@ static void released(msfp_run *run)
     run->gradients = NULL;
     run->hooks = NULL;
 }
-
-static const struct msfp_hooks hooks = {
-    .prescribed_step = prescribed_step,
-    .stage_solved = stage_solved,
-    .stages_ended = stages_ended,
-    .before_step = before_step,
-    .extreme_taken = extreme_taken,
-    .step_recorded = msfp_accepted_step_columns,
-    .step_accepted = step_accepted,
-    .place_of_node = place_of_node,
-    .node_observed = node_observed,
-    .jumped = jumped,
-    .last_row_written = last_row_written,
-    .released = released,
-};
 
 int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *in)
 {
@@ -198,9 +136,8 @@ int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *in)
     g->batches = (in->count + C - 1) / C;
     g->energies = in->energies;
     g->event_time = -INFINITY;
-    g->extremes_taken = 1; /* the first step begins by forgetting all */
-    g->steps = in->steps;
-    g->step_count = in->step_count;
+    run->ends = in->steps;
+    run->end_count = in->step_count;
     g->batch = calloc(g->batches ? (size_t)g->batches : 1, sizeof *g->batch);
     if (!g->batch)
         return run->status = MSFP_E_MEMORY;
@@ -209,7 +146,7 @@ int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *in)
     for (int i = 0; i < g->batches && run->status == MSFP_OK; ++i)
         run->status = msfp_initial_columns(run, &g->batch[i], 1);
     if (run->status == MSFP_OK && g->count)
-        run->status = msfp_record_present_columns(run, 1);
+        run->status = msfp_record_state_columns(run, 1);
     return run->status;
 }
 

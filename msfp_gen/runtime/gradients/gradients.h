@@ -165,26 +165,28 @@ typedef struct {
     msfp_work work[MSFP_STAGES];
     msfp_slopes slopes[MSFP_STAGES];
     int all_slopes; /* whether those of the last stage are complete */
-    int ringing; /* whether the step integrates its works as where rates ring (msfp_refine_works) */
     double factors[MSFP_STAGES][MSFP_DOF * MSFP_DOF];
     int pivots[MSFP_STAGES][MSFP_DOF];
 } msfp_stage_history;
 
-/* Rows at the start of the last step, at its interpolation nodes and at its end, with the evaluations there; and
- * columns of one batch. */
+/* The evaluation of a state outside of a step; g: the friction force over -mu N. */
 typedef struct {
-    msfp_row value[MSFP_NODES + 2];
-    msfp_observation node[MSFP_NODES + 2];
-    msfp_slopes slopes[MSFP_NODES + 2];
-    int known, sloped[MSFP_NODES + 2]; /* whether `value` and `node`, and one of `slopes`, are */
+    msfp_point at;
+    msfp_stage_weights weights;
+    double g[MSFP_NB][2];
+    msfp_work work;
+    msfp_slopes slopes;
+} msfp_observation;
+
+/* Evaluations at the start of the last step and at its interpolation nodes; columns of the rows there and at its end,
+ * of one batch. */
+typedef struct {
+    msfp_observation node[MSFP_NODES + 1], own;
+    int node_known[MSFP_NODES + 1]; /* whether `node` is */
     msfp_row_columns d[MSFP_NODES + 2], row;
     int columns_known; /* whether `d` is */
-    msfp_observation own;
-    msfp_slopes own_slopes;
     msfp_work_columns work;
 } msfp_recording;
-
-#define MSFP_NOT_TAKEN (-1.0)
 
 struct msfp_gradients {
     int count, batches; /* parameters, and batches of MSFP_COLUMNS of them */
@@ -192,16 +194,12 @@ struct msfp_gradients {
     msfp_parameter_batch *batch;
     msfp_stage_history stage_history;
     msfp_recording recording;
-    const double *steps; /* ends of the steps where they are prescribed [s], with their number and how many are taken */
-    int step_count, step;
     double *rows; /* [row][parameter][MSFP_ROW_SIZE] */
     size_t row_count, row_capacity;
     double *events; /* [event][parameter]: time, displacement, top force */
     size_t event_count, event_capacity;
-    double extreme_share[MSFP_EXTREME_COUNT]; /* of the last step, where it took this extreme; else MSFP_NOT_TAKEN */
-    int extremes_taken;                       /* whether it took one */
-    double event_time;                        /* of the last rim contact or release [s] */
-    msfp_run own;           /* the run, while a step to an event is taken once more */
+    double event_time; /* of the last rim contact or release [s] */
+    msfp_run own;      /* the run, while a step to an event is taken once more */
 };
 
 /* ---- initial_columns.c, step_columns.c: states ---- */
@@ -324,6 +322,8 @@ void msfp_row_of_cubic_columns(msfp_run *run, msfp_parameter_batch *batch, doubl
 /* Columns of the extremes that the first row, or the step, has changed. */
 void msfp_extremes_of_first_row(const msfp_run *run, msfp_parameter_batch *batch, const msfp_row *row,
                                 const msfp_row_columns d);
+/* Whether the step has changed some. */
+int msfp_step_has_extreme(const msfp_run *run);
 void msfp_extremes_of_step(msfp_run *run, msfp_parameter_batch *batch);
 
 /* ---- recording.c ---- */
@@ -333,11 +333,11 @@ double msfp_event_at_end(msfp_run *run, int kind, int j, double *rate);
 /* Columns of the time from the end of the step to an event there, by those of the state at the end: minus the columns of
  * what decides the event, over its rate. Where that does not change they are zero. */
 void msfp_event_time_columns(msfp_run *run, msfp_parameter_batch *batch, int kind, int j, double *dt);
-/* Record the columns of the present state, and those of the extremes of a first row. Returns MSFP_OK or
- * MSFP_E_MEMORY. */
-int msfp_record_present_columns(msfp_run *run, int first);
-/* Columns of the rows that the accepted step recorded. Returns MSFP_OK or MSFP_E_MEMORY. */
-int msfp_record_rows_columns(msfp_run *run);
+/* Columns of a row that was recorded of a state: of the first one, with those of the extremes, or of the end of the step.
+ * Returns MSFP_OK or MSFP_E_MEMORY. */
+int msfp_record_state_columns(msfp_run *run, int first);
+/* Columns of the first `count` rows of the run, as far as they are new. Returns MSFP_OK or MSFP_E_MEMORY. */
+int msfp_record_rows_columns(msfp_run *run, size_t count);
 /* Columns of its events and of the extremes that it changed. Returns MSFP_OK or MSFP_E_MEMORY. */
 int msfp_record_extremes_columns(msfp_run *run);
 

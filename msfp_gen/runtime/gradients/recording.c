@@ -106,7 +106,7 @@ static void event_columns(msfp_run *run, msfp_parameter_batch *batch, int kind, 
     memcpy(event + 4, d + MSFP_ROW_TOP_FORCE, 3 * sizeof *event);
 }
 
-int msfp_record_present_columns(msfp_run *run, int first)
+int msfp_record_state_columns(msfp_run *run, int first)
 {
     struct msfp_gradients *g = run->gradients;
     msfp_columns *d = g->recording.row;
@@ -114,7 +114,7 @@ int msfp_record_present_columns(msfp_run *run, int first)
         return MSFP_E_MEMORY;
     for (int i = 0; i < g->batches; ++i) {
         msfp_parameter_batch *batch = &g->batch[i];
-        msfp_observe_columns(run, batch, &run->now, &batch->now, d);
+        msfp_observe_columns(run, batch, first ? &run->now : &run->next, first ? &batch->now : &batch->next, d);
         for (size_t r = g->row_count; r < run->row_count; ++r)
             store(g, g->rows, r, i, MSFP_ROW_SIZE, (const msfp_columns *)d);
         if (first) {
@@ -140,17 +140,17 @@ static const msfp_columns *row_columns(msfp_run *run, msfp_parameter_batch *batc
     return (const msfp_columns *)d;
 }
 
-int msfp_record_rows_columns(msfp_run *run)
+int msfp_record_rows_columns(msfp_run *run, size_t count)
 {
     struct msfp_gradients *g = run->gradients;
     if (reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE)) /* NOLINT(-Wanalyzer-malloc-leak): kept in g */
         return MSFP_E_MEMORY;
     for (int i = 0; i < g->batches; ++i) {
         g->recording.columns_known = 0;
-        for (size_t r = g->row_count; r < run->row_count; ++r)
+        for (size_t r = g->row_count; r < count; ++r)
             store(g, g->rows, r, i, MSFP_ROW_SIZE, row_columns(run, &g->batch[i], run->rows[r].time));
     }
-    g->row_count = run->row_count;
+    g->row_count = count;
     return MSFP_OK;
 }
 

@@ -7,10 +7,17 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
+/* The evaluation of a state, with the derivatives of its contacts. */
+static void observe(msfp_run *run, const msfp_state *s, msfp_observation *o)
+{
+    msfp_to_point(run, s, &o->at);
+    msfp_evaluate_state(&run->parameters, &o->at, &o->weights, &o->work, o->g);
+    msfp_contact_slopes(&run->parameters, &o->weights, &o->work, (const double (*)[2])o->g, 1, &o->slopes);
+}
+
 /* Columns of the row of an observed state. */
 static void observed_columns(msfp_run *run, msfp_parameter_batch *batch, const msfp_observation *o,
-                             const msfp_slopes *slopes, const msfp_state *s, const msfp_state_columns *ds,
-                             msfp_row_columns d)
+                             const msfp_state *s, const msfp_state_columns *ds, msfp_row_columns d)
 {
     const msfp_parameters *p = &run->parameters;
     msfp_work_columns *dw = &run->gradients->recording.work;
@@ -23,7 +30,7 @@ static void observed_columns(msfp_run *run, msfp_parameter_batch *batch, const m
     memcpy(dat.f, ds->f, sizeof dat.f);
     memcpy(dat.foot, ds->foot, sizeof dat.foot);
     msfp_memory_point_columns(s, ds, 0.0, &dat);
-    msfp_condensed_columns(p, &batch->parameters, &o->at, &dat, &o->weights, &o->work, slopes, MSFP_OF_ROW, dw);
+    msfp_condensed_columns(p, &batch->parameters, &o->at, &dat, &o->weights, &o->work, &o->slopes, MSFP_OF_ROW, dw);
     msfp_record_columns(p, &batch->parameters, &o->at, &dat, &o->work, dw, d);
     memcpy(d[MSFP_ROW_WORK], ds->work, sizeof ds->work);
 }
@@ -31,25 +38,23 @@ static void observed_columns(msfp_run *run, msfp_parameter_batch *batch, const m
 void msfp_observe_columns(msfp_run *run, msfp_parameter_batch *batch, const msfp_state *s, const msfp_state_columns *ds,
                           msfp_row_columns d)
 {
-    const msfp_parameters *p = &run->parameters;
     msfp_observation *o = &run->gradients->recording.own;
-    msfp_slopes *slopes = &run->gradients->recording.own_slopes;
-    msfp_to_point(run, s, &o->at);
-    msfp_evaluate_state(p, &o->at, &o->weights, &o->work, o->g);
-    msfp_contact_slopes(p, &o->weights, &o->work, (const double (*)[2])o->g, 1, slopes);
-    observed_columns(run, batch, o, slopes, s, ds, d);
+    observe(run, s, o);
+    observed_columns(run, batch, o, s, ds, d);
 }
 
-/* Columns of row `index` of those at the start of the step and at its nodes, at the state with the columns ds. */
-static void node_columns(msfp_run *run, msfp_parameter_batch *batch, int index, const msfp_state *s,
-                         const msfp_state_columns *ds, msfp_row_columns d)
+/* Columns of row `index` of those at the start of the step and at its nodes; ds: of its state. */
+static void node_columns(msfp_run *run, msfp_parameter_batch *batch, int index, const msfp_state_columns *ds,
+                         msfp_row_columns d)
 {
     msfp_recording *r = &run->gradients->recording;
-    const msfp_observation *o = &r->node[index];
-    if (!r->sloped[index])
-        msfp_contact_slopes(&run->parameters, &o->weights, &o->work, (const double (*)[2])o->g, 1, &r->slopes[index]);
-    r->sloped[index] = 1;
-    observed_columns(run, batch, o, &r->slopes[index], s, ds, d);
+    msfp_state s = run->now;
+    if (index > 0)
+        msfp_interpolate(run, run->node[index - 1].share, &s);
+    if (!r->node_known[index])
+        observe(run, &s, &r->node[index]);
+    r->node_known[index] = 1;
+    observed_columns(run, batch, &r->node[index], &s, ds, d);
 }
 
 /* Columns of the rows at the ends and nodes of the step, into the recording, unless they are there. */
@@ -57,13 +62,10 @@ static void all_node_columns(msfp_run *run, msfp_parameter_batch *batch)
 {
     msfp_recording *r = &run->gradients->recording;
     const int last = run->node_count + 1;
-    msfp_row row;
     if (r->columns_known)
         return;
-    if (!r->known)
-        msfp_row_inside(run, 1.0, &row); /* which gives the rows to the recording */
     if (!batch->start_known)
-        node_columns(run, batch, 0, &run->now, &batch->now, batch->start_row);
+        node_columns(run, batch, 0, &batch->now, batch->start_row);
     memcpy(r->d[0], batch->start_row, sizeof batch->start_row);
     for (int i = 1; i < last; ++i) {
         const double share = run->node[i - 1].share;
@@ -71,7 +73,7 @@ static void all_node_columns(msfp_run *run, msfp_parameter_batch *batch)
         for (int c = 0; c < C; ++c)
             node->t[c] = batch->now.t[c] + share * batch->h[c];
         msfp_linear_rates((const double *)&batch->now, (const double *)&batch->next, share, C, (double *)node);
-        node_columns(run, batch, i, &run->node[i - 1].state, node, r->d[i]);
+        node_columns(run, batch, i, node, r->d[i]);
     }
     msfp_row_reached_columns(run, batch);
     memcpy(r->d[last], batch->end_row, sizeof batch->end_row);
@@ -98,9 +100,9 @@ static void weight_slopes(const msfp_run *run, double share, double *slopes)
 }
 
 /* Columns of Y, Z where msfp_limit_row has scaled them to the size of those of another row. */
-static void limit_friction(const msfp_recording *rows, const msfp_row *row, const msfp_row_limits *limits,
-                           msfp_row_columns d)
+static void limit_friction(const msfp_run *run, const msfp_row *row, const msfp_row_limits *limits, msfp_row_columns d)
 {
+    const msfp_row_columns *of_rows = run->gradients->recording.d;
     for (int j = 0; j < NB; ++j) {
         const double most = limits->most[j], share = limits->share[j];
         const int of = limits->row[j];
@@ -108,7 +110,7 @@ static void limit_friction(const msfp_recording *rows, const msfp_row *row, cons
             double outward = 0.0, further = 0.0;
             for (int i = 0; i < 2; ++i) {
                 outward += row->f[j][i] / most * d[MSFP_ROW_F + 2 * j + i][c];
-                further += of < 0 ? 0.0 : rows->value[of].f[j][i] / most * rows->d[of][MSFP_ROW_F + 2 * j + i][c];
+                further += of < 0 ? 0.0 : run->node_rows[of].f[j][i] / most * of_rows[of][MSFP_ROW_F + 2 * j + i][c];
             }
             for (int i = 0; i < 2; ++i) {
                 double *column = &d[MSFP_ROW_F + 2 * j + i][c];
@@ -121,14 +123,13 @@ static void limit_friction(const msfp_recording *rows, const msfp_row *row, cons
 /* Columns of a row with the bounds of msfp_limit_row. */
 static void limit_row(msfp_run *run, msfp_parameter_batch *batch, int count, msfp_row *row, msfp_row_columns d)
 {
-    const msfp_recording *rows = &run->gradients->recording;
     msfp_columns gaps[NB][MSFP_GAP_SIZE];
     double sliding[NB][MSFP_GAP_SIZE];
     msfp_row_limits limits;
     msfp_gaps_columns(&run->parameters, &batch->parameters, (const double(*)[NQ])row->q,
                       (msfp_columns(*)[NQ])(d + MSFP_ROW_Q), sliding, gaps);
-    msfp_limit_row(rows->value, count, sliding, row, &limits);
-    limit_friction(rows, row, &limits, d);
+    msfp_limit_row(run->node_rows, count, sliding, row, &limits);
+    limit_friction(run, row, &limits, d);
     for (int j = 0; j < NB; ++j) {
         memcpy(d[MSFP_ROW_SLIDING + j], gaps[j][MSFP_GAP_S], sizeof *d);
         if (!MSFP_UPLIFT)
@@ -141,16 +142,16 @@ static void limit_row(msfp_run *run, msfp_parameter_batch *batch, int count, msf
 MSFP_WIDE void msfp_row_between_columns(msfp_run *run, msfp_parameter_batch *batch, double share, int moving,
                                         msfp_row_columns d)
 {
+    msfp_observe_nodes(run);
     all_node_columns(run, batch);
-    const msfp_recording *rows = &run->gradients->recording;
     const msfp_weights w = msfp_weights_at(run, share);
     const double h = run->next.t - run->now.t;
     const double *values[MSFP_NODES + 2] = { NULL }, *columns[MSFP_NODES + 2] = { NULL };
     msfp_columns moved; /* of the share */
     msfp_row blended;
     for (int r = 0; r < w.count; ++r) {
-        values[r] = (const double *)&rows->value[r];
-        columns[r] = rows->d[r][0];
+        values[r] = (const double *)&run->node_rows[r];
+        columns[r] = run->gradients->recording.d[r][0];
     }
     msfp_weigh(w.of, w.count, values, MSFP_ROW_SIZE, (double *)&blended);
     msfp_weigh(w.of, w.count, columns, MSFP_ROW_SIZE * C, d[0]);

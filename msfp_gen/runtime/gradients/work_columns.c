@@ -17,8 +17,8 @@ static void refine(const msfp_run *run, const msfp_parameter_batch *batch, const
 {
     const msfp_stage_history *s = &run->gradients->stage_history;
     double rates[WORKS] = { 0.0 };
-    msfp_refine_works(method, (const double *)stages, sizeof *stages / sizeof(double), h, s->ringing, C, work[0]);
-    msfp_refine_works(method, (const double *)s->state, sizeof *s->state / sizeof(double), 1.0, s->ringing, 1, rates);
+    msfp_refine_works(method, (const double *)stages, sizeof *stages / sizeof(double), h, run->ringing, C, work[0]);
+    msfp_refine_works(method, (const double *)s->state, sizeof *s->state / sizeof(double), 1.0, run->ringing, 1, rates);
     msfp_add_scaled(work, rates, batch->h, 1.0, WORKS);
 }
 

@@ -75,7 +75,6 @@ static void take(msfp_run *run, const msfp_row *row, double share, enum wanted w
                 continue;
             extreme[k] = value;
             time[k] = at;
-            MSFP_HOOK(run, extreme_taken(run, (int)(extreme - (double *)&run->extremes) + k, share), (void)0);
         }
     }
 }

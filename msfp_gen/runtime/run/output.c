@@ -4,21 +4,14 @@
 #include <string.h>
 #include "run.h"
 
-static void observe(msfp_run *run, const msfp_state *s, msfp_observation *o, msfp_row *row)
-{
-    const msfp_parameters *p = &run->parameters;
-    msfp_to_point(run, s, &o->at);
-    msfp_evaluate_state(p, &o->at, &o->weights, &o->work, o->g);
-    const msfp_mechanical mechanical = msfp_mechanical_energy(p, &o->at, &o->work);
-    msfp_record(p, &o->at, &o->work, &mechanical, row);
-    row->time = s->t;
-    memcpy(row->work, s->work, sizeof row->work);
-}
-
 void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row)
 {
-    msfp_observation o;
-    observe(run, s, &o, row);
+    msfp_point at;
+    msfp_work w;
+    msfp_to_point(run, s, &at);
+    msfp_observe(&run->parameters, &at, &w, row);
+    row->time = s->t;
+    memcpy(row->work, s->work, sizeof row->work);
 }
 
 /* The array with room for one more item; NULL where there is no memory. */
@@ -138,31 +131,28 @@ int msfp_write_now(msfp_run *run)
     return msfp_write_row(run, &run->now);
 }
 
-/* Rows at the ends of the last step and at its interpolation nodes, where it has some. */
-static void observe_nodes(msfp_run *run, msfp_row rows[MSFP_NODES + 2])
+void msfp_observe_nodes(msfp_run *run)
 {
     const int last = run->node_count + 1;
     msfp_state inside;
-    msfp_observation own;
-    for (int i = 0; i <= last && run->node_count; ++i) {
-        const msfp_state *s = i == 0 ? &run->now : i == last ? &run->next : &inside;
-        if (s == &inside)
+    for (int i = 0; i <= last && !run->nodes_observed; ++i) {
+        if (i > 0 && i < last)
             msfp_interpolate(run, run->node[i - 1].share, &inside);
-        msfp_observation *o = MSFP_HOOK(run, place_of_node(run, i), NULL);
-        observe(run, s, o ? o : &own, &rows[i]);
-        MSFP_HOOK(run, node_observed(run, i, &rows[i]), (void)0);
+        msfp_observe_state(run, i == 0 ? &run->now : i == last ? &run->next : &inside, &run->node_rows[i]);
     }
+    run->nodes_observed = 1;
 }
 
-/* The row at a share of the last step; rows: of its nodes. */
-static void row_between(msfp_run *run, const msfp_row *rows, double share, msfp_row *row)
+void msfp_row_inside(msfp_run *run, double share, msfp_row *row)
 {
+    const msfp_row *rows = run->node_rows;
     msfp_state s;
     msfp_interpolate(run, share, &s);
     if (run->node_count) {
         msfp_row_limits limits;
         double sliding[NB][MSFP_GAP_SIZE];
         const msfp_weights w = msfp_weights_at(run, share);
+        msfp_observe_nodes(run);
         blend(rows, &w, row);
         msfp_gaps(&run->parameters, (const double(*)[NQ])row->q, sliding);
         msfp_limit_row(rows, w.count, sliding, row, &limits);
@@ -171,24 +161,15 @@ static void row_between(msfp_run *run, const msfp_row *rows, double share, msfp_
     memcpy(row->work, s.work, sizeof row->work);
 }
 
-void msfp_row_inside(msfp_run *run, double share, msfp_row *row)
-{
-    msfp_row rows[MSFP_NODES + 2];
-    observe_nodes(run, rows);
-    row_between(run, rows, share, row);
-}
-
 /* Rows at even times up to `last`, inside the last step. */
 static int write_between(msfp_run *run, double last)
 {
-    msfp_row rows[MSFP_NODES + 2];
     const double h = run->next.t - run->now.t;
-    observe_nodes(run, rows);
     for (; run->output_time <= last; run->output_time = msfp_next_output(run)) {
         msfp_row *row = new_row(run);
         if (!row)
             return MSFP_E_MEMORY;
-        row_between(run, rows, fmin(1.0, (run->output_time - run->now.t) / h), row);
+        msfp_row_inside(run, fmin(1.0, (run->output_time - run->now.t) / h), row);
         row->time = run->output_time;
     }
     return MSFP_OK;

@@ -182,7 +182,6 @@ static int shorten_step(msfp_run *run, double h, double factor, int status)
 static int accept(msfp_run *run, const double *before, double *after, int located, double error, double h)
 {
     ++run->counts[MSFP_COUNT_STEPS];
-    MSFP_HOOK(run, before_step(run), (void)0);
     /* A step that was cut to end at a given time says little about the step size: the earlier proposal stands. */
     const int cut = h < 0.9 * run->h && error < 0.5;
     const double factor = msfp_step_factor(error, run->previous_error, msfp_control_order(run->options.method));
@@ -197,23 +196,22 @@ static int accept(msfp_run *run, const double *before, double *after, int locate
     if (run->status)
         return 0;
     msfp_extremes_step(run);
-    if ((run->status = MSFP_HOOK(run, step_recorded(run, before, after), MSFP_OK)))
+    if (stop && run->options.output_step > 0.0)
+        run->status = msfp_write_row(run, &run->next);
+    if (run->status == MSFP_OK)
+        run->status = MSFP_HOOK(run, step_accepted(run, before, after), MSFP_OK);
+    if (run->status)
         return 0;
     if (run->options.sampled && at_stop(run)) /* the slope of the accelerations changes here */
         memset(run->acceleration_slope, 0, sizeof run->acceleration_slope);
     run->now = run->next;
-    MSFP_HOOK(run, step_accepted(run), (void)0);
 #if MSFP_CLOSED_FORM
     run->step_history = run->next_step_history;
 #endif
     memcpy(run->events_now, after, sizeof run->events_now);
-    if (stop) {
-        if (run->options.output_step > 0.0)
-            msfp_write_row(run, &run->now);
-        run->status = MSFP_HOOK(run, last_row_written(run), MSFP_OK) ? MSFP_E_MEMORY : MSFP_STOPPED;
-        return 0;
-    }
-    if (run->next_jump < run->jump_count && run->now.t >= run->jumps[run->next_jump] - msfp_smallest_step(run->now.t)) {
+    if (stop)
+        run->status = MSFP_STOPPED;
+    else if (run->next_jump < run->jump_count && run->now.t >= run->jumps[run->next_jump] - msfp_smallest_step(run->now.t)) {
         run->now.t = fmax(run->now.t, run->jumps[run->next_jump++]);
         run->status = msfp_consistent_initial_state(run);
         if (run->status == MSFP_OK)
@@ -232,7 +230,8 @@ static int one_step(msfp_run *run)
     if (msfp_is_quasistatic(run))
         h = msfp_limit_step(run, h);
     h = h > 0.999 * left ? left : h > 0.5 * left ? 0.5 * left : h;
-    const double prescribed = MSFP_HOOK(run, prescribed_step(run), 0.0);
+    const long step = run->counts[MSFP_COUNT_STEPS];
+    const double prescribed = step < run->end_count ? run->ends[step] - run->now.t : 0.0;
     if (prescribed > 0.0)
         h = prescribed;
     int relocations = 0;
@@ -295,7 +294,6 @@ int msfp_run_advance(msfp_run *run, long steps)
 
 void msfp_run_free(msfp_run *run)
 {
-    MSFP_HOOK(run, released(run), (void)0);
     free(run->rows);
     free(run->events);
     run->rows = NULL;

@@ -52,13 +52,6 @@ int msfp_classify_failure(msfp_run *run, int status);
 
 /* ---- output.c; writing returns MSFP_OK or MSFP_E_MEMORY ---- */
 
-/* The evaluation of a state outside of a step; g: the friction force over -mu N. */
-typedef struct msfp_observation {
-    msfp_point at;
-    msfp_stage_weights weights;
-    double g[MSFP_NB][2];
-    msfp_work work;
-} msfp_observation;
 /* A row of a state. */
 void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row);
 /* Displacement across the bearing less that at the start [3], [m]. */
@@ -77,6 +70,8 @@ typedef struct {
 /* Set these in a row that is interpolated from `count` rows; sliding: as of msfp_gaps, at its angles. */
 void msfp_limit_row(const msfp_row *rows, int count, double sliding[MSFP_NB][MSFP_GAP_SIZE], msfp_row *row,
                     msfp_row_limits *limits);
+/* Rows at the ends of the last step and at its interpolation nodes, which it has, into run->node_rows. */
+void msfp_observe_nodes(msfp_run *run);
 /* The row at a share of the last step, 0 to 1, but for its time. */
 void msfp_row_inside(msfp_run *run, double share, msfp_row *row);
 /* kind: enum msfp_event_kind; surface counted from 1, 0: none. */

@@ -112,7 +112,6 @@ static double unit_disc_error(const msfp_run *run, const msfp_stage *s)
 void msfp_stage_end(msfp_run *run, msfp_stages *s, int i)
 {
     memcpy(s->now.at.f, s->now.f, sizeof s->now.at.f);
-    MSFP_HOOK(run, stage_solved(run, i, &s->now), (void)0);
     msfp_state *stage = &s->stage[i];
     stage->t = run->now.t + s->method->c[i] * s->h;
     stage->energy = 0.0; /* known once the step is accepted */
@@ -128,6 +127,7 @@ void msfp_stage_end(msfp_run *run, msfp_stages *s, int i)
         msfp_force_F_get(run->work.force[NB], node->top_force);
     }
     s->other = fmax(s->other, unit_disc_error(run, &s->now));
+    MSFP_HOOK(run, stage_solved(run, i, &s->now, stage), (void)0);
 }
 
 /* The embedded estimate of an undamped fast mode is as large as its ringing, although the method damps it. As Hosea and
@@ -173,7 +173,7 @@ void msfp_stages_begin(msfp_run *run, msfp_stages *s, double h)
 {
     s->method = msfp_tableau_of(run->options.method);
     const double beta = s->method->gamma * h;
-    run->node_count = 0;
+    run->node_count = run->nodes_observed = 0;
     s->h = h;
     s->other = 0.0;
     s->now.beta = beta;
@@ -207,10 +207,10 @@ void msfp_stages_end(msfp_run *run, msfp_stages *s, double *error)
     double other = fmax(s->other, msfp_friction_jump_error(now, next));
     other = fmax(other, msfp_memory_error(run, &estimate, next, s->now.beta));
     *error = fmax(other, msfp_error_norm(run, &estimate, 0));
-    msfp_refine_works(method, (const double *)s->stage, sizeof *s->stage / sizeof(double), h, *error > 1.0, 1,
+    run->ringing = *error > 1.0;
+    msfp_refine_works(method, (const double *)s->stage, sizeof *s->stage / sizeof(double), h, run->ringing, 1,
                       next->work);
-    MSFP_HOOK(run, stages_ended(run, s, *error > 1.0), (void)0);
-    if (*error > 1.0) {
+    if (run->ringing) {
         filter(run, s, &estimate);
         *error = fmax(other, msfp_error_norm(run, &estimate, 0));
     }

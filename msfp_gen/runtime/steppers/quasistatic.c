@@ -235,7 +235,7 @@ int msfp_step_quasistatic(msfp_run *run, double h, double *error)
     if (status)
         return status;
     finish(run, &s, h);
-    MSFP_HOOK(run, stage_solved(run, 1, &s), (void)0);
+    MSFP_HOOK(run, stage_solved(run, 1, &s, &run->next), (void)0);
     *error = fmax(msfp_friction_jump_error(&run->now, &run->next), reversal_error(run, h));
     count_work(run, &s, h);
     return MSFP_OK;

@@ -189,30 +189,14 @@ void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at, double load_pow
 /* ---- hooks: what follows a run while it takes its steps; in models with gradients only ---- */
 
 #if MSFP_GRADIENTS
-struct msfp_observation; /* run.h */
 /* Those that return an int return a status. */
 struct msfp_hooks {
-    /* Length of the next step where the ends of the steps are prescribed [s]; 0: they are not. */
-    double (*prescribed_step)(const msfp_run *run);
-    /* Stage i of the step in progress, solved. */
-    void (*stage_solved)(msfp_run *run, int i, const msfp_stage *stage);
-    /* States of its stages; ringing: whether its works are integrated as where rates ring. */
-    void (*stages_ended)(msfp_run *run, const msfp_stages *s, int ringing);
-    /* Before an accepted step is recorded; for each extreme that it has, at a share of the step; after it is recorded;
-     * once its end is the present state. */
-    void (*before_step)(msfp_run *run);
-    void (*extreme_taken)(msfp_run *run, int index, double share);
-    int (*step_recorded)(msfp_run *run, const double *before, const double *after);
-    void (*step_accepted)(msfp_run *run);
-    /* Where to evaluate row `index` of those at the ends of the last step and at its interpolation nodes, and then the
-     * row; NULL: anywhere. */
-    struct msfp_observation *(*place_of_node)(msfp_run *run, int index);
-    void (*node_observed)(msfp_run *run, int index, const msfp_row *row);
-    /* After a jump of the accelerations; after a last row of a run that was stopped. */
+    /* Stage i of the step in progress is solved, by the evaluation in run->work. */
+    void (*stage_solved)(msfp_run *run, int i, const msfp_stage *stage, const msfp_state *state);
+    /* The step from run->now to run->next is accepted and recorded; before, after: event functions at its ends. */
+    int (*step_accepted)(msfp_run *run, const double *before, const double *after);
+    /* The accelerations of the present state have jumped. */
     int (*jumped)(msfp_run *run);
-    int (*last_row_written)(msfp_run *run);
-    /* The run is released. */
-    void (*released)(msfp_run *run);
 };
 /* A call of one of them, where they are set. */
 #define MSFP_HOOK(run, call, otherwise) ((run)->hooks ? (run)->hooks->call : (otherwise))
