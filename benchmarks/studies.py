@@ -16,21 +16,22 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from hashlib import sha256
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
+from batch import WAYS, way, worker_counts
 from quick import installed, parser, pick
 
 import msfp_gen
 from msfp_gen import simulate
-from msfp_gen.common.cores import usable_cores
 from msfp_gen.scene.file.loader import dumps
 from msfp_gen.studies import fragility, load_study, read_study
 
 KILLS = pick(5, 2)
-PLANAR = {  # about 2 ms a run
+PLANAR = {  # less than 1 ms a run
     "bearing": "fenz-tfp",
     "motion": {"kind": "harmonic", "amplitude": 0.025, "frequency": 0.5, "cycles": 1.0},
     "top": {"kind": "rig", "axial_load": 112e3, "stiffness": 1e8, "rotational_stiffness": 1e6},
@@ -181,18 +182,19 @@ def rate(folder: Path) -> float:
 
 
 def cores(folder: Path, _: int) -> Iterator[str]:
-    """Runs per second on all cores over those on one, best of three rounds in turns."""
-    count = usable_cores()
-    file = folder / "study.toml"
-    file.write_text(dumps(ten_ms(pick(1024, 64), chunk=8)), encoding="utf-8")
-    found: dict[int, list[float]] = {1: [], count: []}
-    for number in range(pick(3, 1)):
-        for workers, rates in found.items():
-            out = folder / f"{workers}-{number}"
-            assert start(file, out, "--workers", str(workers)).wait() == 0
-            rates.append(rate(out))
-    ratio = max(found[count]) / max(found[1]) / count
-    yield f"runs per second on {count} cores over {count} times those on one, 10 ms a run | {ratio:.2f}"
+    """Runs per second by number of workers over those of one, in threads, in processes and as chosen."""
+    counts, kinds = worker_counts()[1:], {"planar": planar(pick(8192, 64)), "10 ms": ten_ms(pick(1024, 64), chunk=8)}
+    for kind, table in kinds.items():
+        found: dict[tuple[str, int], float] = {}
+        for number in range(pick(3, 1)):
+            for each, workers in [("threads", 1), *product(WAYS, counts)]:
+                out = folder / f"{kind}-{each}-{workers}-{number}"
+                with way(each):
+                    msfp_gen.study(table, out, workers=workers)
+                found[each, workers] = max(found.get((each, workers), 0.0), rate(out))
+        one = found.pop(("threads", 1))
+        ratios = ", ".join(f"{each} {workers}: {value / one:.2f}" for (each, workers), value in found.items())
+        yield f"runs per second over those of one worker ({one:.0f} runs/s), {kind} runs | {ratios}"
 
 
 def overhead(folder: Path, _: int) -> Iterator[str]:
@@ -207,7 +209,7 @@ def overhead(folder: Path, _: int) -> Iterator[str]:
     loops, studies = [], []
     for number in range(pick(5, 1)):
         loops.append(_seconds(loop))
-        studies.append(_seconds(lambda: msfp_gen.study(study, folder / str(number), threads=True, workers=1)))  # noqa: B023
+        studies.append(_seconds(lambda: msfp_gen.study(study, folder / str(number), workers=1)))  # noqa: B023
     share = min(studies) / min(loops) - 1
     each = 1e3 * min(loops) / len(scenes)
     yield f"CPU time of a study on one worker beyond that of a loop of `simulate`, {each:.0f} ms a run | {100 * share:.1f} %"
@@ -231,7 +233,7 @@ def fragilities(folder: Path, _: int) -> Iterator[str]:
     for seed in range(seeds):
         sampling = {"samples": 300, "seed": seed, "method": "random"}
         table = planar(300, axes=axes, sampling=sampling, quantities={"ratio": "scale / capacity"})
-        msfp_gen.study(table, folder / str(seed), threads=True, workers=1)
+        msfp_gen.study(table, folder / str(seed), workers=1)
         state = fragility(read_study(folder / str(seed)), "scale", "ratio", [1.0]).states[0]
         held["median"] += state.median_interval[0] <= 1.2 <= state.median_interval[1]
         held["dispersion"] += state.dispersion_interval[0] <= 0.4 <= state.dispersion_interval[1]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Iterator
 
 import pytest
 
@@ -18,6 +20,14 @@ _BEFORE = pytest.StashKey[set[str]]()
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update", action="store_true", help="rewrite the golden files of tests/golden")
+
+
+@pytest.fixture(autouse=True)
+def no_idle_workers() -> Iterator[None]:
+    """Workers of a test do not live on: their processes would not have what the next test changes."""
+    yield
+    if workers := sys.modules.get("msfp_gen.studies.workers"):
+        workers.end_idle()
 
 
 @pytest.fixture

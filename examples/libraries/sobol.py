@@ -29,7 +29,7 @@ problem = {
 values = sampling.sample(problem, 32, calc_second_order=False, seed=1)
 folder = Path(mkdtemp())
 table = {"scene": "fenz-test1", "axes": AXES, "sampling": {"method": "listed", "values": values.tolist()}}
-study({**table, "keep": ["peak_force"]}, folder, threads=True)
+study({**table, "keep": ["peak_force"]}, folder)
 rows = read_study(folder, ["peak_force"])
 indices = analysis.analyze(problem, rows["peak_force"].to_numpy(), calc_second_order=False, seed=1)
 for name, first, total in zip(AXES, indices["S1"], indices["ST"], strict=True):

@@ -63,7 +63,6 @@ Output = Annotated[
 Dask = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: its scheduler, or a scheduler file.")
 ]
-Threads = Annotated[bool, typer.Option("--threads", help="Threads in place of processes.")]
 
 
 @group.command(
@@ -78,7 +77,6 @@ def run(
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder of the study: part-*.parquet.")
     ] = None,
     workers: Workers = None,
-    threads: Threads = False,
     dask: Dask = None,
     shard: Annotated[
         str | None, typer.Option(metavar="I/N", help="Only every N-th chunk, from the I-th; for arrays of jobs.")
@@ -116,7 +114,7 @@ def run(
     question = {
         "quantity": estimate, "statistic": statistic, "threshold": threshold, "target": target, "budget": budget,
     }  # fmt: skip
-    engine: dict[str, Any] = {"workers": workers, "threads": threads, "dask": dask}
+    engine: dict[str, Any] = {"workers": workers, "dask": dask}
     if "accuracy" in definition.table or any(value is not None for value in question.values()):
         if shard is not None:
             raise InputError("--shard: the runs of an estimate depend on those before; give --workers or --dask")

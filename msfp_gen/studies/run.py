@@ -36,14 +36,13 @@ from msfp_gen.studies.batch import (
     BAD_INPUT,
     ENDED,
     OUT_OF_TIME,
-    Pool,
     build_models,
     check_method,
-    pool_from,
     run_to_end,
 )
 from msfp_gen.studies.columns import Column, Keep
 from msfp_gen.studies.definition import Study, Task, load_study
+from msfp_gen.studies.workers import Pool, pool_from
 
 if TYPE_CHECKING:
     from msfp_gen.scene.system import System
@@ -74,7 +73,6 @@ def study(
     output: str | Path,
     *,
     workers: int | None = None,
-    threads: bool = False,
     executor: Executor | None = None,
     dask: str | None = None,
     shard: tuple[int, int] = (1, 1),
@@ -83,14 +81,12 @@ def study(
     """Run the missing chunks of a study; each chunk becomes one Parquet file in the folder of the study.
 
     The same call continues a study that was interrupted at any time; each worker loses one chunk at most. A run that
-    fails is a row with its status and message. With processes, a script must make this call under
-    `if __name__ == "__main__":`.
+    fails is a row with its status and message.
 
     Args:
         source: a study file (docs/studies.md), a table of the same keys, or a `Study`.
         output: the folder of the study, for `part-*.parquet` and `study.toml`; made if it does not exist.
         workers: runs at the same time; None: one for each core.
-        threads: threads instead of processes: they start at once, and suit few and long runs.
         executor: an executor (`concurrent.futures`) to run on, such as that of mpi4py or Parsl; it stays open.
         dask: address or scheduler file of a Dask cluster to run on.
         shard: (i, n): only every n-th chunk, from the i-th; for job arrays that share `output`.
@@ -101,7 +97,7 @@ def study(
     """
     _check_shard(shard)
     definition = source if isinstance(source, Study) else load_study(source)
-    with pool_from(workers, threads, executor, dask) as pool:
+    with pool_from(workers, executor, dask) as pool:
         return run_on(pool, definition, Path(output), shard, progress)
 
 

@@ -50,12 +50,12 @@ def await_parts(folder: Path, count: int) -> None:
 
 def test_a_study_runs_continues_and_says_how_far_it_is(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = written(tmp_path), tmp_path / "out"
-    assert main(["study", str(path), "-o", str(out), "--threads", "--shard", "1/2"]) == 0
+    assert main(["study", str(path), "-o", str(out), "--shard", "1/2"]) == 0
     assert capsys.readouterr().out == f"8 of 8 runs are in {out}; 0 failed\n"
     assert main(["study", "status", str(out)]) == 0
     shown = capsys.readouterr().out
     assert "8 of 12 done (66.7 %)" in shown and "parts   2 of 3" in shown
-    assert main(["study", str(path), "-o", str(out), "--threads", "--json"]) == 0
+    assert main(["study", str(path), "-o", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"runs": 12, "before": 8, "done": 4, "failed": 0}
     assert main(["study", "status", str(out), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -67,7 +67,7 @@ def test_an_estimate_is_printed_and_kept_as_json(tmp_path: Any, capsys: pytest.C
         written(tmp_path, scene=planar(tmp_path), accuracy={"models": ["massless"], "pilot": 16}),
         tmp_path / "out",
     )
-    arguments = ["study", str(path), "-o", str(out), "--threads", "--workers", "1", "--target", "20%"]
+    arguments = ["study", str(path), "-o", str(out), "--workers", "1", "--target", "20%"]
     assert main([*arguments, "--estimate", "peak_force"]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert "mean of peak_force" in shown[0]
@@ -98,7 +98,6 @@ def test_the_example_can_be_loaded(tmp_path: Any, capsys: pytest.CaptureFixture[
         (["none.toml", "-o", "out"], "none.toml.*no such file"),
         (["study.toml", "-o", "out", "--shard", "3/2"], "shard = '3/2': give i/n"),
         (["study.toml", "-o", "out", "--shard", "x"], "--shard = 'x': give i/n"),
-        (["study.toml", "-o", "out", "--threads", "--dask", "a"], "dask and threads: give one engine"),
         (["study.toml", "-o", "out", "--workers", "0"], "workers = 0"),
         (["status", "out"], "no study.toml here"),
     ],
@@ -123,8 +122,8 @@ def test_killed_studies_continue_to_the_same_table(tmp_path: Any) -> None:
     process.communicate(timeout=30)  # ends only when no worker holds its pipes
     before = len(list(out.glob("part-*.parquet")))
     assert 2 <= before < 30 and (out / "study.toml").is_file()
-    assert main(["study", str(path), "-o", str(out), "--threads"]) == 0
-    assert main(["study", str(path), "-o", str(whole), "--threads"]) == 0
+    assert main(["study", str(path), "-o", str(out)]) == 0
+    assert main(["study", str(path), "-o", str(whole)]) == 0
     pd.testing.assert_frame_equal(rows_of(out), rows_of(whole))
 
 
@@ -140,7 +139,7 @@ def test_killed_estimates_continue_with_the_same_draws(tmp_path: Any, capsys: py
     before = {part.name: part.stat().st_mtime_ns for part in out.glob("part-*.parquet")}
     found = []
     for folder in (out, whole):
-        assert main(["study", str(path), "-o", str(folder), "--estimate", "peak_force", "--threads", "--json"]) == 0
+        assert main(["study", str(path), "-o", str(folder), "--estimate", "peak_force", "--json"]) == 0
         found.append(json.loads(capsys.readouterr().out))
     assert before.items() <= {part.name: part.stat().st_mtime_ns for part in out.glob("part-*.parquet")}.items()
     pd.testing.assert_frame_equal(rows_of(out).head(16), rows_of(whole).head(16))
@@ -151,7 +150,7 @@ def test_killed_estimates_continue_with_the_same_draws(tmp_path: Any, capsys: py
 
 def test_ctrl_c_keeps_what_is_done(tmp_path: Any) -> None:
     path, out = written(tmp_path, sampling={"samples": 300, "seed": 3}, chunk=2), tmp_path / "out"
-    process = started(path, "-o", out, "--threads", "--workers", "1")
+    process = started(path, "-o", out, "--workers", "1")
     await_parts(out, 3)
     process.send_signal(signal.SIGINT)
     _, error = process.communicate(timeout=30)

@@ -23,7 +23,7 @@ from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.figures.style import INK, distinct, headline, page, plain
 from msfp_gen.results.quantities import MOVING, Source
 from msfp_gen.scene.file.catalogue import suggestion
-from msfp_gen.studies.batch import ENDED, pool_from
+from msfp_gen.studies.batch import ENDED
 from msfp_gen.studies.bounding.runs import CASES, shown_as
 from msfp_gen.studies.columns import names_of
 
@@ -210,11 +210,12 @@ def bound_suite(
     Raises InputError: as of `study`, or an unknown record; RunError: no run reached its end.
     """
     from msfp_gen.studies.run import run_on
+    from msfp_gen.studies.workers import local_pool
 
     check_left_out(leave_out, study)
     names = list(study.inputs.records)
     without = [len(CASES) * names.index(name) + case for name in leave_out for case in range(len(CASES))]
-    with TemporaryDirectory() as temporary, pool_from(workers, threads=True) as pool:
+    with TemporaryDirectory() as temporary, local_pool(workers) as pool:
         folder = Path(temporary if output is None else output)
         run_on(pool, study, folder, progress=progress, without=without)
         return _from_rows(study, folder, leave_out)

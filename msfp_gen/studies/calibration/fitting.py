@@ -49,7 +49,7 @@ def fit(
 ) -> Fit:
     """Fit parameters of a scene so that its runs give the measured forces of tests.
 
-    An evaluation runs every test once, with the derivatives of its force (docs/gradients.md), in threads on all cores.
+    An evaluation runs every test once, with the derivatives of its force (docs/gradients.md), on all cores.
     `scipy.optimize.least_squares` makes the next step within the bounds (method "trf"). The first runs have the
     tolerance of the scene; the tolerance then falls until the error of the runs is small against the intervals.
 
@@ -61,7 +61,7 @@ def fit(
         bounds: path -> least and largest value [SI]; by default a tenth and ten times the value in the scene.
         offset: whether to fit an offset of the force of each test too.
         columns: names of the columns: see `read_measurement`.
-        progress: called during the runs, in their threads, with the number of the evaluation, the share of it that is
+        progress: called during the runs, in other threads, with the number of the evaluation, the share of it that is
             done, and the last deviation [N]. An exception in it ends the fit.
         max_evaluations: largest number of evaluations in the search; the runs with smaller tolerances after the search
             are not counted.

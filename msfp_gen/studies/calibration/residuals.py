@@ -7,7 +7,7 @@ go out.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,9 +21,10 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.parameters import Parameter, changed_parameters, parameters_of
 from msfp_gen.simulation.gradients import UNDAMPED, undamped_surfaces
 from msfp_gen.simulation.simulate import simulate
-from msfp_gen.studies.batch import SharedProgress, local_pool
 from msfp_gen.studies.calibration.intervals import SINGULAR
 from msfp_gen.studies.calibration.measurement import Measurement
+from msfp_gen.studies.process import proceed
+from msfp_gen.studies.workers import SharedProgress, Ways, local_pool
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
@@ -183,6 +184,7 @@ class Residuals:
     count: int = 0
     deviation: float = np.nan
     _last: tuple[bytes, Evaluation] | None = None
+    _ways: Ways = field(default_factory=Ways)
 
     @property
     def names(self) -> list[str]:
@@ -257,36 +259,37 @@ class Residuals:
         for spec in dict.fromkeys(scene.spec for scene in self.scenes):
             build_model(spec.layout, spec.effects, gradients=slopes)
         shared = SharedProgress(len(self.tests), self._report)
-
-        def run(index: int) -> Run:
-            try:
-                return self._run(index, values, slopes, shared.of(index))
-            except (RunError, InputError) as error:
-                return error
-
+        tests = enumerate(zip(self.tests, self.scenes, strict=True))
+        calls = ((index, (test, scene, self.unknowns, values, slopes)) for index, (test, scene) in tests)
         self._report(0.0, 1.0)  # a short run does not report by itself
-        with local_pool(min(len(self.tests), usable_cores())) as pool:
-            runs = dict(pool.results(run, ((index, (index,)) for index in range(len(self.tests)))))
+        with local_pool(min(len(self.tests), usable_cores()), self._ways) as pool:
+            runs = dict(pool.results(_run, calls, shared.of))
         return [runs[index] for index in range(len(self.tests))]
 
     def _report(self, share: float, _: float) -> None:
         if self.progress is not None:
             self.progress(self.count, share, self.deviation)
 
-    def _run(
-        self, index: int, values: Array, slopes: bool, show: Callable[[float, float], None]
-    ) -> tuple[Array, Array]:
-        """Force of a run at the times of its test, shape (T,) [N], and its derivatives, shape (T, k) or (T, 0)."""
-        test, scene = self.tests[index], changed_scene(self.scenes[index], self.unknowns, values)
-        paths = [member.path for unknown in self.unknowns for member in unknown.members]
-        result = simulate(scene, gradients=paths if slopes else (), gradient_errors=False, progress=show)
-        time, at = result.history.time, test.time - test.time[0]
-        force = np.interp(at, time, result.history.top_force[:, 0])
-        if result.gradients is None:
-            return force, np.zeros((len(at), 0))
-        rows = dict(zip(paths, result.gradients.arrays["top_force"][:, :, 0], strict=True))
-        columns = [sum(rows[member.path] for member in unknown.members) for unknown in self.unknowns]
-        return force, np.column_stack([np.interp(at, time, np.asarray(column)) for column in columns])
+
+def _run(test: Measurement, scene: Scene, unknowns: Sequence[Unknown], values: Array, slopes: bool) -> Run:
+    """Force of a run at the times of its test, shape (T,) [N], and its derivatives, shape (T, k) or (T, 0)."""
+    paths = [member.path for unknown in unknowns for member in unknown.members]
+    try:
+        result = simulate(
+            changed_scene(scene, unknowns, values),
+            gradients=paths if slopes else (),
+            gradient_errors=False,
+            progress=proceed,
+        )
+    except (RunError, InputError) as error:
+        return error
+    time, at = result.history.time, test.time - test.time[0]
+    force = np.interp(at, time, result.history.top_force[:, 0])
+    if result.gradients is None:
+        return force, np.zeros((len(at), 0))
+    rows = dict(zip(paths, result.gradients.arrays["top_force"][:, :, 0], strict=True))
+    columns = [sum(rows[member.path] for member in unknown.members) for unknown in unknowns]
+    return force, np.column_stack([np.interp(at, time, np.asarray(column)) for column in columns])
 
 
 def scenes_of(scene: Scene, tests: Sequence[Measurement]) -> tuple[Scene, ...]:

@@ -24,7 +24,6 @@ from msfp_gen.figures.style import COLOURS, FAINT, INK, headline, page
 from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.studies.assessment.rows import labelled
 from msfp_gen.studies.axes import SceneFactory
-from msfp_gen.studies.batch import pool_from
 from msfp_gen.studies.definition import Study, load_study
 from msfp_gen.studies.estimation.estimators import (
     EXACT,
@@ -34,6 +33,7 @@ from msfp_gen.studies.estimation.estimators import (
     work,
 )
 from msfp_gen.studies.estimation.source import Source, StudySource
+from msfp_gen.studies.workers import pool_from
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -177,7 +177,6 @@ def estimate(
     pilot: int | None = None,
     seed: int | None = None,
     workers: int | None = None,
-    threads: bool = False,
     executor: Executor | None = None,
     dask: str | None = None,
     progress: Any = None,
@@ -188,7 +187,7 @@ def estimate(
     The folder is the folder of a study with the exact runs; the runs of each cheaper model are a study in a folder
     within it. The same call continues an interrupted estimate.
 
-    source, workers, threads, executor, dask: as of `study`. folder: of the study. quantity to seed: as in
+    source, workers, executor, dask: as of `study`. folder: of the study. quantity to seed: as in
     `Question`, by default the keys of `[accuracy]` in the study file; target and budget also as texts, such as "2 %"
     and "10 min". progress: called with the name of a model and a number of draws before the runs of these draws.
 
@@ -204,7 +203,7 @@ def estimate(
     assert question.quantity is not None
     existed = Path(folder).exists()
     try:
-        with pool_from(workers, threads, executor, dask) as pool:
+        with pool_from(workers, executor, dask) as pool:
             runs = StudySource(study, Path(folder), question.quantity, levels, question.seed, pool, progress)
             result = estimated(runs, replace(question, side=study.keep.side(question.quantity)))
     except _BudgetError:

@@ -17,10 +17,10 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.studies.assessment.rows import COMPLETE, numbers, read_study
 from msfp_gen.studies.axes import Sampling, SceneFactory, values_at
-from msfp_gen.studies.batch import Pool
 from msfp_gen.studies.definition import Study
 from msfp_gen.studies.estimation.estimators import EXACT
 from msfp_gen.studies.run import STUDY_FILE, parts_in, readable_parts, run_on, study_table
+from msfp_gen.studies.workers import Pool
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]

@@ -168,7 +168,7 @@ def test_a_study_takes_a_building(path: Path, tmp_path: Path):
     assert [s.friction for s in scene.bearings[0].bearing.surfaces] == pytest.approx([0.036, 0.017, 0.017, 0.1284])
     assert scene.bearings[1].bearing.surfaces[1].friction == 0.02
     assert scene.bearings[2].interface.vertical_stiffness == 5e7
-    outcome = study(file, tmp_path / "runs", workers=1, threads=True)
+    outcome = study(file, tmp_path / "runs", workers=1)
     assert outcome.runs == outcome.done == 2 and outcome.failed == 0
     rows = parquet.read_table(next((tmp_path / "runs").glob("part-*.parquet"))).to_pydict()
     run = simulate(scene)

@@ -47,6 +47,7 @@ from msfp_gen.scene.file.source import changed_scene
 from msfp_gen.scene.scene import InitialState
 from msfp_gen.studies import batch
 from msfp_gen.studies.sweep import variations, varied_field
+from msfp_gen.studies.workers import Workers, worker_count
 
 STILL = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, ORDER)))
 
@@ -157,10 +158,11 @@ def test_every_number_is_that_of_simulate_for_effects_laws_and_methods() -> None
     assert "give effects.uplift = true" in results[-1].message
 
 
-def test_every_number_is_that_of_simulate_in_processes() -> None:
+def test_every_number_is_that_of_simulate_in_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Workers, "in_process", lambda *_: True)
     scenes = [usual()[0], of_every_kind()[7], *failing(), flying()]
     told: list[tuple[int, int]] = []
-    results = simulate_batch(scenes, workers=2, processes=True, progress=lambda done, count: told.append((done, count)))
+    results = simulate_batch(scenes, workers=2, progress=lambda done, count: told.append((done, count)))
     assert told == [(done, len(scenes)) for done in range(1, len(scenes) + 1)]
     for scene, result in zip(scenes, results, strict=True):
         assert result.scene is scene
@@ -204,14 +206,16 @@ def test_models_are_built_once_and_before_any_run(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("processes", [False, True])
-def test_an_error_of_the_caller_ends_all_runs(processes: bool) -> None:
+def test_an_error_of_the_caller_ends_all_runs(processes: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Workers, "in_process", lambda *_: processes)
+
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
     before = threading.active_count()
     begin = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
-        simulate_batch([*endless(1), load_scene("fenz-test1")], workers=2, processes=processes, progress=interrupted)
+        simulate_batch([*endless(1), load_scene("fenz-test1")], workers=2, progress=interrupted)
     assert time.perf_counter() - begin < 20.0
     assert threading.active_count() == before
 
@@ -222,11 +226,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a
 sys.path.insert(0, "{tests}")
 from support import endless
 from msfp_gen import build_model, simulate_batch
-if __name__ == "__main__":
-    scenes = endless(6)
-    build_model(scenes[0].bearing.layout, scenes[0].modelled)
-    print("ready", flush=True)
-    simulate_batch(scenes, workers=2, processes={processes})
+from msfp_gen.studies.workers import Workers
+Workers.in_process = lambda *_: {processes}
+scenes = endless(6)
+build_model(scenes[0].bearing.layout, scenes[0].modelled)
+print("ready", flush=True)
+simulate_batch(scenes, workers=2)
 """
 
 
@@ -298,10 +303,10 @@ def test_a_run_that_fails_at_its_start_has_the_state_there(monkeypatch: pytest.M
 
 def test_the_number_of_workers_is_that_of_the_cores_or_as_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 3, 5}, raising=False)
-    assert usable_cores() == batch.worker_count(None) == 3 and batch.worker_count(2) == 2
+    assert usable_cores() == worker_count(None) == 3 and worker_count(2) == 2
     monkeypatch.delattr(os, "sched_getaffinity")
     monkeypatch.setattr(os, "cpu_count", lambda: 7)
-    assert batch.worker_count(None) == 7
+    assert worker_count(None) == 7
 
 
 def test_fields_take_several_values() -> None:

@@ -9,6 +9,7 @@ import re
 from functools import cache
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -41,6 +42,7 @@ from msfp_gen.studies import read_study
 from msfp_gen.studies.bounding import CASES, Bounds, bound, bounded_scenes, factor_tables, load_factors
 from msfp_gen.studies.bounding.factors import _read
 from msfp_gen.studies.bounding.runs import _scaled, bounded_scene, bounding_tables, plot_bounds
+from msfp_gen.studies.workers import Workers
 
 ASCE = ((1 + 0.75 * 0) * 0.7 * 0.85, (1 + 0.75 * (1.3 * 1.2 - 1)) * 1.3 * 1.15)
 
@@ -316,7 +318,7 @@ def test_an_interruption_stops_all_runs(monkeypatch: Any) -> None:
     def interrupted(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("msfp_gen.studies.batch.wait", interrupted)
+    monkeypatch.setattr("msfp_gen.studies.workers.SimpleQueue", lambda: Mock(get=interrupted))
     with pytest.raises(KeyboardInterrupt):
         bound(load_scene("fenz-test2"), load_factors("asce7"))
 
@@ -486,16 +488,19 @@ def test_records_left_out_are_those_of_the_suite(options: list[str], words: str,
     assert words in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("threads", [True, False])
-def test_a_study_at_the_bounds_of_a_sheet_runs_them_in_every_worker(threads: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize("processes", [True, False])
+def test_a_study_at_the_bounds_of_a_sheet_runs_them_in_every_worker(
+    processes: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A worker process has a copy of the table `sheet`, which must mean the same there."""
+    monkeypatch.setattr(Workers, "in_process", lambda *_: processes)
     table = toml_table(scene_text(load_scene("fenz-test2")))
     friction = [surface["friction"] for surface in table["bearing"]["surfaces"]]
     table["bearing"] |= {
         f"friction_{bound}": [mu * by for mu in friction] for bound, by in (("lower", 0.5), ("upper", 1.5))
     }
     definition = {"scene": table, "axes": {"bounds": {"factors": "sheet"}}, "keep": ["peak_force"]}
-    study(definition, tmp_path, threads=threads, workers=1)
+    study(definition, tmp_path, workers=2)
     forces = read_study(tmp_path)["peak_force"].tolist()
     assert forces[0] < forces[1] < forces[2]
 

@@ -293,15 +293,15 @@ def small_study(**changes):
 def test_an_estimate_of_a_study_is_kept_and_continued(tmp_path):
     accuracy = {"quantity": "peak_displacement", "target": "80 %", "pilot": 16, "models": ["equivalent"]}
     table = small_study(accuracy=accuracy)
-    first = estimate(table, tmp_path / "out", threads=True, workers=1)
+    first = estimate(table, tmp_path / "out", workers=1)
     rows = read_study(tmp_path / "out")
     assert len(rows) == first.runs["exact"] >= 16 and "peak_force" in rows.columns
     assert (tmp_path / "out" / "equivalent" / "study.toml").is_file() and first.correlation["equivalent"] > 0.8
     times = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("part-*")}
-    again = estimate(table, tmp_path / "out", threads=True, workers=1)
+    again = estimate(table, tmp_path / "out", workers=1)
     assert again.value == first.value and again.interval == first.interval
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("part-*")} == times
-    tighter = estimate(table, tmp_path / "out", target="30 %", threads=True, workers=1)
+    tighter = estimate(table, tmp_path / "out", target="30 %", workers=1)
     assert tighter.runs["exact"] >= first.runs["exact"] and tighter.half < first.half
     assert len(estimate_table(tighter).rows) <= 10
     plot_estimate(tighter, tmp_path / "e.png")
@@ -326,7 +326,7 @@ def test_bad_input_is_one_line_and_writes_nothing(tmp_path, case):
     accuracy, text = BAD[case]
     table = small_study(accuracy=accuracy)
     with pytest.raises(InputError, match=text) as error:
-        estimate(table, tmp_path / "out", threads=True)
+        estimate(table, tmp_path / "out")
     assert "\n" not in str(error.value) and not (tmp_path / "out").exists()
 
 
@@ -334,7 +334,7 @@ def test_a_target_beyond_the_budget_leaves_no_folder(tmp_path):
     """Its pilot is needed to know; a folder that was there before keeps its runs."""
     goal = {"quantity": "peak_displacement", "target": "0.01 %", "pilot": 16, "budget": "1 s", "models": ["equivalent"]}
     with pytest.raises(InputError, match="budget = 1 s: give a target of") as error:
-        estimate(small_study(accuracy=goal), tmp_path / "out", threads=True)
+        estimate(small_study(accuracy=goal), tmp_path / "out")
     assert "\n" not in str(error.value) and not (tmp_path / "out").exists()
 
 
@@ -342,7 +342,7 @@ def test_a_target_beyond_the_budget_leaves_no_folder(tmp_path):
 def test_an_estimate_on_dask_has_the_same_runs(tmp_path):
     distributed = pytest.importorskip("distributed")
     table = small_study(accuracy={"quantity": "peak_displacement", "target": "30 %", "pilot": 16})
-    local = estimate(table, tmp_path / "threads", threads=True, workers=2)
+    local = estimate(table, tmp_path / "threads", workers=2)
     cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50)
     with cluster, distributed.Client(cluster) as client:
         spread = estimate(table, tmp_path / "dask", executor=client.get_executor(pure=False), workers=2)
@@ -363,7 +363,5 @@ def test_the_hospital_is_a_base_scene(tmp_path):
         "axes": {"damping": {"sets": "building.damping_ratio", "distribution": "uniform", "low": 0.02, "high": 0.08}},
         "sampling": {"samples": 4},
     }
-    found = estimate(
-        table, tmp_path / "out", "peak_force", target=0.5, pilot=16, models=["equivalent"], threads=True, workers=1
-    )
+    found = estimate(table, tmp_path / "out", "peak_force", target=0.5, pilot=16, models=["equivalent"], workers=1)
     assert found.interval[0] < found.value < found.interval[1] and found.correlation["equivalent"] > 0.8

@@ -230,7 +230,7 @@ def test_every_column_knows_how_a_run_that_ended_early_bounds_it(tmp_path: Path)
     made = load_study({"scene": "fenz-test1", "keep": names, "quantities": quantities, "axes": axes})
     expected = SIDES | dict(zip(quantities, FORMULAS.values(), strict=True))
     assert {name: made.keep.side(name) for name in expected} == expected
-    msfp_gen.study(made, tmp_path, threads=True, workers=1)
+    msfp_gen.study(made, tmp_path, workers=1)
     sides = read_study(tmp_path).attrs["sides"]
     assert {name: sides[name] for name in expected} == expected and side_of(read_study(tmp_path), "q1") == "least"
 
@@ -310,7 +310,7 @@ def one_at_a_time(tmp_path_factory: pytest.TempPathFactory) -> Path:
     }
     quantities = {"found": "case * (2 * a + b)"}
     table = cheap_study(axes=axes, quantities=quantities, sampling={"method": "one-at-a-time"})
-    msfp_gen.study(table, folder, threads=True)
+    msfp_gen.study(table, folder)
     return folder
 
 
@@ -325,13 +325,13 @@ def test_a_tornado_has_each_axis_alone(one_at_a_time: Path) -> None:
 
 
 def test_sensitivity_needs_its_sampling_and_all_runs(one_at_a_time: Path, tmp_path: Path) -> None:
-    msfp_gen.study(cheap_study(), tmp_path / "other", threads=True)
+    msfp_gen.study(cheap_study(), tmp_path / "other")
     with pytest.raises(InputError, match=r"needs a study with sampling.method = 'one-at-a-time'"):
         tornado(tmp_path / "other", "peak_displacement")
     with pytest.raises(InputError, match="statistic = 'mode': give one of median"):
         tornado(one_at_a_time, "found", "mode")
     table = cheap_study(sampling={"method": "one-at-a-time"}, chunk=2)
-    msfp_gen.study(table, tmp_path / "half", threads=True, shard=(1, 2))
+    msfp_gen.study(table, tmp_path / "half", shard=(1, 2))
     with pytest.raises(InputError, match="4 of 6 runs are done; complete the study"):
         tornado(tmp_path / "half", "peak_displacement")
 
@@ -356,7 +356,7 @@ def analytic(tmp_path_factory: pytest.TempPathFactory) -> Path:
     }
     quantities = {"ratio": "scale / capacity"}
     table = cheap_study(axes=axes, quantities=quantities, sampling={"samples": 64, "method": "random"}, chunk=32)
-    msfp_gen.study(table, folder, threads=True)
+    msfp_gen.study(table, folder)
     return folder
 
 

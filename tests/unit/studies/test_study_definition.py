@@ -112,7 +112,7 @@ def test_the_intensity_measure_is_that_of_the_spectrum(tmp_path: Any) -> None:
     spectrum = response_spectrum(RecordMotion(**motions[0]).build(), [2.0])
     expected = spectrum.psa[0, MEASURES.index("rotd100")]
     assert study.inputs.intensities == {"clc": pytest.approx(expected)}
-    msfp_gen.study(study, tmp_path, threads=True)
+    msfp_gen.study(study, tmp_path)
     rows = rows_of(tmp_path)
     np.testing.assert_allclose(rows.intensity, [0.1 * expected, 0.2 * expected])
     np.testing.assert_allclose(rows.twice, 2 * rows.intensity)

@@ -43,7 +43,7 @@ def test_two_studies_in_one_process_have_their_own_records(tmp_path: Path) -> No
     with ThreadPoolExecutor(1) as executor:
         for file in (small, large):
             msfp_gen.study(of_record(file), tmp_path / f"{file.parent.name}-out", executor=executor)
-    msfp_gen.study(of_record(large), tmp_path / "alone", threads=True)
+    msfp_gen.study(of_record(large), tmp_path / "alone")
     found = [rows_of(tmp_path / name).peak_displacement[0] for name in ("a-out", "b-out", "alone")]
     assert found[1] == found[2] > 2 * found[0]
 
@@ -71,10 +71,10 @@ def test_files_that_an_axis_names_are_in_the_identity(tmp_path: Path) -> None:
         "chunk": 1,
     }
     (tmp_path / "study.toml").write_text(dumps(table), encoding="utf-8")
-    msfp_gen.study(tmp_path / "study.toml", tmp_path / "out", threads=True)
+    msfp_gen.study(tmp_path / "study.toml", tmp_path / "out")
     write_record(files[1], 2.5)
     with pytest.raises(InputError, match="parts of another study"):
-        msfp_gen.study(tmp_path / "study.toml", tmp_path / "out", threads=True)
+        msfp_gen.study(tmp_path / "study.toml", tmp_path / "out")
 
 
 def test_values_of_an_axis_are_relative_to_the_study_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,10 +123,10 @@ def test_a_file_that_changes_while_a_study_runs_ends_it(tmp_path: Path) -> None:
     write_record(file, 2.5)
     clear_kept()
     with pytest.raises(RunError, match=r"record.csv: not as it was when it was first read .it has changed since.; run"):
-        msfp_gen.study(study, tmp_path / "out", threads=True)
+        msfp_gen.study(study, tmp_path / "out")
     file.unlink()
     with pytest.raises(RunError, match=r"record.csv: not as it was .*cannot be read here"):
-        msfp_gen.study(study, tmp_path / "out", threads=True)
+        msfp_gen.study(study, tmp_path / "out")
     assert not list((tmp_path / "out").glob("part-*"))
 
 

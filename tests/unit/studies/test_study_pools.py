@@ -128,7 +128,7 @@ def cluster() -> Iterator[Any]:
 def whole(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     """The rows of the study without Dask."""
     folder = tmp_path_factory.mktemp("whole")
-    msfp_gen.study(many(), folder, threads=True)
+    msfp_gen.study(many(), folder)
     return rows_of(folder)
 
 
@@ -162,7 +162,7 @@ def test_a_killed_worker_costs_nothing_but_time(cluster: Any, whole: pd.DataFram
 
 def test_no_scheduler_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("msfp_gen.studies.batch.CONNECT", "1s")
+    monkeypatch.setattr("msfp_gen.studies.workers.CONNECT", "1s")
     with pytest.raises(InputError, match=r"--dask = 'tcp://127.0.0.1:9': no scheduler answers there") as caught:
         msfp_gen.study(many(), tmp_path / "out", dask="tcp://127.0.0.1:9")
     assert "\n" not in str(caught.value) and not (tmp_path / "out").exists()
@@ -178,12 +178,12 @@ def test_rows_of_mpi_are_those_of_threads(tmp_path: Path) -> None:
     command = [str(LAUNCHER), "-n", "3", sys.executable, "-m", "mpi4py.futures", str(program), str(file), str(out)]
     run = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     assert run.returncode == 0, run.stderr
-    msfp_gen.study(file, whole, threads=True)
+    msfp_gen.study(file, whole)
     pd.testing.assert_frame_equal(rows_of(out), rows_of(whole))
 
 
 @pytest.mark.slow
 def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("msfp_gen.studies.batch.find_spec", lambda _: None)
+    monkeypatch.setattr("msfp_gen.studies.workers.find_spec", lambda _: None)
     with pytest.raises(InputError, match="--dask needs distributed; pip install distributed"):
         msfp_gen.study(many(), tmp_path / "out", dask="tcp://127.0.0.1:9")

@@ -38,7 +38,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_rows_are_those_of_simulate(tmp_path: Path) -> None:
     shown: list[tuple[int, int]] = []
-    done = msfp_gen.study(cheap_study(), tmp_path, threads=True, progress=lambda *now: shown.append(now))
+    done = msfp_gen.study(cheap_study(), tmp_path, progress=lambda *now: shown.append(now))
     assert done == (12, 0, 12, 0) and shown[0] == (0, 12) and shown[-1] == (12, 12)
     rows, study = rows_of(tmp_path), load_study(cheap_study())
     assert list(rows.run) == list(range(1, 13)) and (rows.status == "ok").all() and (rows.message == "").all()
@@ -53,15 +53,15 @@ def test_rows_are_those_of_simulate(tmp_path: Path) -> None:
 
 
 def test_what_is_missing_is_computed_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    msfp_gen.study(cheap_study(), tmp_path, threads=True)
+    msfp_gen.study(cheap_study(), tmp_path)
     whole = contents(tmp_path)
     lost = sorted(whole)[1]
     (tmp_path / lost).unlink()
     asked, run_chunk = [], running.run_chunk
     monkeypatch.setattr(running, "run_chunk", lambda order, task: asked.append(task.number) or run_chunk(order, task))
-    assert msfp_gen.study(cheap_study(), tmp_path, threads=True) == (12, 8, 4, 0)
+    assert msfp_gen.study(cheap_study(), tmp_path) == (12, 8, 4, 0)
     assert asked == [1] and contents(tmp_path) == whole
-    assert msfp_gen.study(cheap_study(), tmp_path, threads=True) == (12, 12, 0, 0) and asked == [1]
+    assert msfp_gen.study(cheap_study(), tmp_path) == (12, 12, 0, 0) and asked == [1]
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
@@ -71,17 +71,17 @@ def test_an_interrupted_study_keeps_what_is_done(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        msfp_gen.study(cheap_study(), tmp_path, threads=True, workers=1, progress=interrupt)
+        msfp_gen.study(cheap_study(), tmp_path, workers=1, progress=interrupt)
     assert len(contents(tmp_path)) == 2
-    assert msfp_gen.study(cheap_study(), tmp_path, threads=True) == (12, 8, 4, 0)
+    assert msfp_gen.study(cheap_study(), tmp_path) == (12, 8, 4, 0)
 
 
 def test_shards_make_one_study(tmp_path: Path) -> None:
     whole, shards = tmp_path / "whole", tmp_path / "shards"
-    msfp_gen.study(cheap_study(), whole, threads=True)
-    assert msfp_gen.study(cheap_study(), shards, threads=True, shard=(1, 2)) == (8, 0, 8, 0)
+    msfp_gen.study(cheap_study(), whole)
+    assert msfp_gen.study(cheap_study(), shards, shard=(1, 2)) == (8, 0, 8, 0)
     assert study_status(shards).done == 8
-    assert msfp_gen.study(cheap_study(), shards, threads=True, shard=(2, 2)) == (4, 0, 4, 0)
+    assert msfp_gen.study(cheap_study(), shards, shard=(2, 2)) == (4, 0, 4, 0)
     assert contents(shards) == contents(whole)
     pd.testing.assert_frame_equal(rows_of(shards), rows_of(whole))
     with pytest.raises(InputError, match="shard = '3/2': give i/n"):
@@ -92,7 +92,7 @@ def test_a_run_that_fails_is_a_row(tmp_path: Path) -> None:
     """Here with more steps than the scene permits."""
     axes = {"steps": {"sets": "solver.max_steps", "values": [10, 1_000_000]}}
     table = cheap_study(axes=axes, sampling=None, chunk=1)
-    done = msfp_gen.study(table, tmp_path, threads=True)
+    done = msfp_gen.study(table, tmp_path)
     rows = rows_of(tmp_path)
     assert done == (2, 0, 2, 1) and list(rows.status) == ["steps", "ok"]
     assert "step" in rows.message[0] and rows.peak_displacement[0] > 0 and study_status(tmp_path).failed == 1
@@ -100,7 +100,7 @@ def test_a_run_that_fails_is_a_row(tmp_path: Path) -> None:
 
 def test_a_run_ends_at_its_limit_of_time(tmp_path: Path) -> None:
     table = cheap_study(scene=LONG, axes={}, sampling=None, limits={"run_seconds": 0.02})
-    assert msfp_gen.study(table, tmp_path, threads=True) == (1, 0, 1, 1)
+    assert msfp_gen.study(table, tmp_path) == (1, 0, 1, 1)
     rows = rows_of(tmp_path)
     assert (rows.status == "limit").all() and rows.peak_displacement.isna().all()
     assert "limits.run_seconds" in rows.message[0]
@@ -110,11 +110,11 @@ def test_a_study_ends_where_too_many_runs_fail(tmp_path: Path) -> None:
     axes = {"steps": {"sets": "solver.max_steps", "values": list(range(1, 13))}}
     table = cheap_study(axes=axes, sampling=None, limits={"failures": 5})
     with pytest.raises(RunError, match=r"8 of 8 runs failed, more than limits.failures = 5; see the column message"):
-        msfp_gen.study(table, tmp_path, threads=True, workers=1)
+        msfp_gen.study(table, tmp_path, workers=1)
     kept = contents(tmp_path)
     assert len(kept) == 2
     with pytest.raises(RunError, match="8 of 8"):  # again: they are counted, and nothing is run
-        msfp_gen.study(table, tmp_path, threads=True, workers=1)
+        msfp_gen.study(table, tmp_path, workers=1)
     assert contents(tmp_path) == kept
 
 
@@ -125,7 +125,7 @@ def test_values_that_a_scene_refuses_are_rows(tmp_path: Path) -> None:
         "b": {"multiplies": "bearing.capacity", "values": [1.0, 3.0]},
     }
     table = cheap_study(axes=axes, sampling=None)
-    assert msfp_gen.study(table, tmp_path, threads=True).failed == 1
+    assert msfp_gen.study(table, tmp_path).failed == 1
     row = rows_of(tmp_path).iloc[3]
     assert row.status == "input" and "capacity" in row.message and row.isna().peak_displacement
 
@@ -140,26 +140,26 @@ def test_values_that_a_scene_refuses_are_rows(tmp_path: Path) -> None:
     ],
 )
 def test_a_folder_holds_one_study(tmp_path: Path, change: dict[str, Any], word: str) -> None:
-    msfp_gen.study(cheap_study(), tmp_path, threads=True)
+    msfp_gen.study(cheap_study(), tmp_path)
     before = contents(tmp_path) | {"study.toml": (tmp_path / "study.toml").read_bytes()}
     with pytest.raises(InputError, match=f"this folder has parts of another study .{word}.; give another folder"):
-        msfp_gen.study(cheap_study(**change), tmp_path, threads=True)
+        msfp_gen.study(cheap_study(**change), tmp_path)
     assert contents(tmp_path) | {"study.toml": (tmp_path / "study.toml").read_bytes()} == before
 
 
 def test_a_study_may_grow_by_values_of_its_first_axis(tmp_path: Path) -> None:
     axes = cheap_study()["axes"]
     longer = {**axes, "rtol": {**axes["rtol"], "values": [1e-2, 5e-3, 4e-3]}}
-    msfp_gen.study(cheap_study(chunk=None), tmp_path, threads=True)  # chunks of 8: the last one has 4 runs
+    msfp_gen.study(cheap_study(chunk=None), tmp_path)  # chunks of 8: the last one has 4 runs
     assert len(contents(tmp_path)) == 2
-    done = msfp_gen.study(cheap_study(axes=longer, chunk=None), tmp_path, threads=True)
+    done = msfp_gen.study(cheap_study(axes=longer, chunk=None), tmp_path)
     assert done == (18, 8, 10, 0)
     assert list(rows_of(tmp_path).run) == list(range(1, 19))
 
 
 def test_a_study_runs_again_from_the_file_in_its_folder(tmp_path: Path) -> None:
-    msfp_gen.study(cheap_study(), tmp_path / "a", threads=True)
-    msfp_gen.study(tmp_path / "a" / "study.toml", tmp_path / "b", threads=True)
+    msfp_gen.study(cheap_study(), tmp_path / "a")
+    msfp_gen.study(tmp_path / "a" / "study.toml", tmp_path / "b")
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
@@ -173,10 +173,10 @@ def test_a_changed_record_is_another_study(tmp_path: Path) -> None:
         "axes": {"a": {"sets": "solver.rtol", "values": [1e-2]}},
         "keep": ["peak_displacement"],
     }
-    msfp_gen.study(table, tmp_path / "out", threads=True)
+    msfp_gen.study(table, tmp_path / "out")
     record.write_text(record.read_text(encoding="utf-8").replace("0.300000", "0.310000"), encoding="utf-8")
     with pytest.raises(InputError, match=r"parts of another study .its files or the equations have changed"):
-        msfp_gen.study(table, tmp_path / "out", threads=True)
+        msfp_gen.study(table, tmp_path / "out")
 
 
 def test_any_executor_serves(tmp_path: Path) -> None:
@@ -191,8 +191,8 @@ def test_any_executor_serves(tmp_path: Path) -> None:
         assert msfp_gen.study(cheap_study(), tmp_path, executor=executor) == (12, 0, 12, 0)
         assert executor.submit(int).result() == 0  # it stays open
     assert threads
-    with pytest.raises(InputError, match="executor and threads: give one engine"):
-        msfp_gen.study(cheap_study(), tmp_path / "b", executor=executor, threads=True)
+    with pytest.raises(InputError, match="executor and dask: give one engine"):
+        msfp_gen.study(cheap_study(), tmp_path / "b", executor=executor, dask="tcp://127.0.0.1:9")
 
 
 @pytest.mark.parametrize("error", [BrokenExecutor("a process died"), None], ids=["broken", "cancelled"])
@@ -209,7 +209,7 @@ def test_workers_that_die_are_one_line(error: Exception | None, tmp_path: Path) 
 
     with pytest.raises(RunError, match=r"workers died .Dying: .*; check their memory, and run the same command again"):
         msfp_gen.study(cheap_study(), tmp_path, executor=Dying(1))
-    assert msfp_gen.study(cheap_study(), tmp_path, threads=True) == (12, 0, 12, 0)
+    assert msfp_gen.study(cheap_study(), tmp_path) == (12, 0, 12, 0)
 
 
 def test_few_calls_wait_at_a_time(tmp_path: Path) -> None:
@@ -237,7 +237,7 @@ def test_few_calls_wait_at_a_time(tmp_path: Path) -> None:
 
 
 def test_status_says_how_far_and_how_fast(tmp_path: Path) -> None:
-    msfp_gen.study(cheap_study(chunk=2), tmp_path, threads=True, shard=(1, 2))
+    msfp_gen.study(cheap_study(chunk=2), tmp_path, shard=(1, 2))
     now = time.time()
     for place, path in enumerate([tmp_path / "study.toml", *sorted(tmp_path.glob("part-*.parquet"))]):
         stamp = now - 14 + 4 * place
@@ -256,7 +256,7 @@ def test_status_says_how_far_and_how_fast(tmp_path: Path) -> None:
 
 def test_the_rate_is_that_of_the_study_where_chunks_end_in_bunches(tmp_path: Path) -> None:
     """Two workers whose chunks of 20 s end within 0.1 s of each other: 0.1 runs per second, not 10."""
-    msfp_gen.study(cheap_study(chunk=1, sampling={"samples": 4, "seed": 3}), tmp_path, threads=True)
+    msfp_gen.study(cheap_study(chunk=1, sampling={"samples": 4, "seed": 3}), tmp_path)
     begin = time.time() - 100
     parts = sorted(tmp_path.glob("part-*.parquet"))
     stamps = [begin - 1000, *(begin + 20 * round_ + late for round_ in (1, 2, 3) for late in (0.0, 0.1))]
@@ -272,12 +272,12 @@ def test_the_rate_is_that_of_the_study_where_chunks_end_in_bunches(tmp_path: Pat
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(InputError, match=r"output = .*file"):
-        msfp_gen.study(cheap_study(), tmp_path / "file", threads=True)
+        msfp_gen.study(cheap_study(), tmp_path / "file")
 
 
 def test_a_damaged_part_is_an_error_that_says_so(tmp_path: Path) -> None:
     """Bytes of its pages that were zeroed or changed, and a missing end: never other rows."""
-    msfp_gen.study(cheap_study(), tmp_path, threads=True, workers=1)
+    msfp_gen.study(cheap_study(), tmp_path, workers=1)
     expected = read_study(tmp_path)
     part = sorted(tmp_path.glob("part-*.parquet"))[1]
     whole, refused = part.read_bytes(), 0
