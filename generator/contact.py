@@ -103,7 +103,7 @@ def report_contact(b: Blocks, friction_model: FrictionModel) -> Program:
     f: Symbols = p.read(b.friction, "f")
     loc: Symbols = p.read(b.relative, "loc", active=("dw",))
     base = contact_basis(p, *(p.let(function(x[a])) for a in ("psi", "theta") for function in (sp.sin, sp.cos)))
-    shear = Shear(f["Y"], f["Z"], (f["Y"], f["Z"]), par["td"], sp.Integer(1))
+    shear = Shear(f["Y"], f["Z"], (f["Y"], f["Z"]), par["td"])
     signed_radius, rates = slip(p, friction_model, par, base, shear, x["N"], loc["dw"])
     par, heat = laws.evaluate_law(p, b, friction_model.coefficient, par, loc, x["N"], rates)
     g = {name: p.let(f[name] + par["td"] * rates[f"d{name}"]) for name in ("Y", "Z")}
@@ -150,14 +150,16 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
     loc: Symbols = p.read(b.contact_frame, "loc")
     g: Symbols = p.read(b.friction_force, "g")
     f = {name: p.let(g[name] - stage["rest"] * (g[name] - stage[name])) for name in ("Y", "Z")}
-    shear = Shear(f["Y"], f["Z"], (stage["Y"], stage["Z"]), stage["tau"], p.let(1 - stage["rest"]))
+    shear = Shear(f["Y"], f["Z"], (stage["Y"], stage["Z"]), stage["tau"])
     unknown = laws.read_unknown_coefficient(p, b, friction_model.coefficient, par)
     N, (sp_, cp_, st_, ct_) = closed_form(p, unknown, loc["p"], g)
     base = contact_basis(p, sp_, cp_, st_, ct_)
     signed_radius, rates = slip(p, friction_model, par, base, shear, N, loc["dw"])
     out = {**rates, **friction(p, friction_model, unknown, base, N, g, loc["dw"], signed_radius)}
     law = friction_model.coefficient
-    out |= laws.law_results(p, law, par, unknown, stage, loc, N, shear.df_dg, rates)
+    out |= laws.law_results(p, law, par, unknown, stage, loc, N, f, g, rates)
+    for name in ("Y", "Z"):
+        out[f"Y{name}"], out[f"Z{name}"] = p.partials((rates["dY"], rates["dZ"]), f[name])
     values = {**out, **f, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_}
     p.write(
         b.contact,

@@ -37,21 +37,18 @@ class Shear:
         Y, Z: friction state.
         before: Y and Z that the earlier stages of a step give.
         tau: sum of the diagonal entry of the stage formula and the damping time T; T outside of a step [s].
-        df_dg: derivative of the friction state f with respect to the friction force over -mu N, g.
     """
 
     Y: sp.Expr
     Z: sp.Expr
     before: tuple[sp.Expr, sp.Expr]
     tau: sp.Expr
-    df_dg: sp.Expr
 
 
 def friction_rates(p: Program, law: str, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:
     """dY/dt and dZ/dt of a hysteresis law at the slip velocity u, v; `dy` is the yield displacement.
 
-    YY, YZ, ZY, ZZ are their derivatives with respect to Y and Z at constant slip velocity. An implicit stage solves for
-    Y and Z with them. `plastic` is the velocity of plastic slip; `plastic_Y`, `plastic_Z` are its derivatives.
+    `plastic` is the velocity of plastic slip.
     """
     return (plastic_rates if is_plastic(law) else partial(bouc_wen_rates, law))(p, shear, u, v, dy)
 
@@ -82,19 +79,12 @@ def bouc_wen_rates(law: str, p: Program, shear: Shear, u: sp.Expr, v: sp.Expr, d
     switches = HYSTERESIS[law].switches
     assert switches is not None
     a, b = switches(yu, zv, lambda x: p.let(Step(p.let(x))))
-    drive, au, bv = p.let(a * yu + b * zv), p.let(a * u), p.let(b * v)
+    drive = p.let(a * yu + b * zv)
     square, along = p.let(Y**2 + Z**2), p.let(yu + zv)
-    positive = p.let(Step(along))
     return {
         "dY": p.let((u - Y * drive) / dy, "dY"),
         "dZ": p.let((v - Z * drive) / dy, "dZ"),
-        "YY": -(drive + Y * au) / dy,
-        "YZ": -Y * bv / dy,
-        "ZY": -Z * au / dy,
-        "ZZ": -(drive + Z * bv) / dy if Z != 0 else Z,
-        "plastic": p.let(square * along * positive),
-        "plastic_Y": positive * (2 * Y * along + square * u),
-        "plastic_Z": positive * (2 * Z * along + square * v),
+        "plastic": p.let(square * along * p.let(Step(along))),
     }
 
 
@@ -105,7 +95,7 @@ def plastic_rates(p: Program, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr)
     `before` + tau (u, v)/d_y, the force of an elastic slip, and d(Y, Z)/dt = (g - before)/tau. With tau = 0 it is the
     limit: elastic inside the disc, and without the outward component on its edge.
     """
-    zero, before = sp.Integer(0), shear.before
+    before = shear.before
     trial = tuple(p.let(f + shear.tau * w / dy) for f, w in zip(before, (u, v), strict=True))
     square = p.let(trial[0] ** 2 + trial[1] ** 2)
     root = p.let(sp.sqrt(p.let(1 + Step(p.let(square - 1)) * (square - 1))))
@@ -117,7 +107,6 @@ def plastic_rates(p: Program, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr)
     return {
         "dY": p.let((u - p.let(trial[0] / root) * slipping) / dy, "dY"),
         "dZ": p.let((v - p.let(trial[1] / root) * slipping) / dy, "dZ"),
-        **dict.fromkeys(("YY", "YZ", "ZY", "ZZ", "plastic_Y", "plastic_Z"), zero),
         "plastic": slipping,
     }
 
@@ -251,7 +240,8 @@ def law_results(
     stage: Symbols,
     loc: Symbols,
     N: sp.Expr,
-    df_dg: sp.Expr,
+    f: Symbols,
+    g: Symbols,
     slip: Symbols,
 ) -> Symbols:
     """Results that a law adds to `contact`; empty for constant friction.
@@ -268,8 +258,9 @@ def law_results(
         stage: symbols of the block `friction_stage`.
         loc: symbols of the block `contact_frame`.
         N: normal force.
-        df_dg: as in `Shear`.
-        slip: slip velocity with the velocity of plastic slip and its derivatives, of `contact.slip`.
+        f: friction state, which follows from g.
+        g: symbols of the friction force over -mu N.
+        slip: slip velocity with the velocity of plastic slip, of `contact.slip`.
     """
     if law is None:
         return {}
@@ -284,10 +275,9 @@ def law_results(
         variables[memory.variable] = results["memory"] = p.let(value, memory.variable)
     mu = results["mu"] = coefficient(p, law, par, variables)
     if memory:
-        by_memory = partial_derivative(p, mu, results["memory"]) if memory.by_friction else sp.Integer(0)
-        results["law_mu"] = p.let(by_memory * stage["gain"] * share)
-    slope = p.let(partial_derivative(p, mu, variables["v"]) * df_dg)
-    return results | {f"law_{name}": p.let(slope * slip[f"plastic_{name}"]) for name in ("Y", "Z")}
+        results["law_mu"] = p.partial(mu, c["mu"], constant=(N, slip["u"], slip["v"]))
+    slope = p.let(p.partial(mu, slip["plastic"]) * p.partial(f["Y"], g["Y"]))
+    return results | {f"law_{name}": p.let(slope * p.partial(slip["plastic"], f[name])) for name in ("Y", "Z")}
 
 
 def evaluate_law(
@@ -348,14 +338,6 @@ def cover(p: Program, par: Symbols, loc: Symbols) -> sp.Expr:
     z = p.let((1 - distance) / COVER_TRANSITION)
     partly, fully = p.let(Step(z + 1)), p.let(Step(z - 1))
     return p.let(fully + (partly - fully) * (2 + z * (3 - z**2)) / 4, "cover")
-
-
-def partial_derivative(p: Program, value: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """Derivative of a named value with respect to one symbol; all other inputs are constant."""
-    saved, p.rates = p.rates, {symbol: sp.Integer(1)}
-    derivative = p.rate(value)
-    p.rates = saved
-    return derivative
 
 
 def operations(p: Program) -> dict[str, Callable[..., sp.Expr]]:

@@ -7,7 +7,7 @@ result is named when it is formed. Expressions therefore stay small, and derivat
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -214,6 +214,27 @@ class Program:
         """`rate` for the three components of a vector."""
         x, y, z = (self.rate(component) for component in vector)
         return (x, y, z)
+
+    def partials(
+        self, values: Iterable[sp.Expr], symbol: sp.Expr, constant: Iterable[sp.Expr] = ()
+    ) -> Iterator[sp.Expr]:
+        """Derivatives of named values with respect to a symbol, as new statements; zero with respect to a number.
+
+        constant: symbols that are held constant, whatever they follow from.
+        """
+        rates = {one: sp.Integer(0) for one in constant if one.is_Symbol}
+        if symbol.is_Symbol:
+            rates[symbol] = sp.Integer(1)
+        for value in values:
+            definition = self._definitions.get(value, value)
+            saved, self.rates = self.rates, rates
+            terms = [derivative(definition, s) * self.rate_of(s) for s in sorted(definition.free_symbols, key=str)]
+            self.rates = saved
+            yield self.let(sp.factor_terms(sp.Add(*terms)), "partial")
+
+    def partial(self, value: sp.Expr, symbol: sp.Expr, constant: Iterable[sp.Expr] = ()) -> sp.Expr:
+        """`partials` of one value."""
+        return next(self.partials((value,), symbol, constant))
 
     def declare_rates(self, vector: Vector, rates: Vector) -> None:
         """Declare the time derivative of a vector of symbols, such as (2.36) for a basis vector."""
