@@ -72,7 +72,7 @@ def plot_modes(scene: BuildingScene, modes: Modes, path: str | Path | None = Non
     order = np.argsort([node.position[2] for node in nodes])
     heights = [float(nodes[index].position[2]) for index in order]
     count = min(DRAWN, len(modes.frequencies))
-    with page(11.5, 3.8, path) as figure:
+    with page(9.5, 3.8, path) as figure:
         headline(figure, f"{scene.name or 'building'}: modes on a fixed base")
         titles = [f"{number}: {1 / modes.frequencies[number - 1]:.3g} s" for number in range(1, count + 1)]
         row = panels(figure, *titles, sharey=True)

@@ -10,6 +10,7 @@ _RUN = RUN | {
     "peak_force": RUN["peak_force"]._replace(words="peak base shear"),
     "peak_force_ratio": RUN["peak_force_ratio"]._replace(words="peak base shear over the weight"),
 }
+LEAST, MOST = "least axial force over the load at rest", "largest axial force over the load at rest"
 AT_CORNERS = "peak floor acceleration at corners"
 QUANTITIES = _RUN | {
     "peak_base_torsion": Quantity("N m", "peak_base_torsion", extreme="most"),
@@ -30,10 +31,11 @@ QUANTITIES = _RUN | {
     "storey_corner_drift_ratio": Quantity("", "storeys.*.peak_corner_drift_ratio", "most", of_parts=True),
     "storey_shear": Quantity("N", "storeys.*.peak_shear.radial", "most", of_parts=True),
     "bearing_displacement": Quantity("m", "bearings.*.peak_displacement.radial", "most", of_parts=True),
-    "bearing_load_ratio": Quantity("", "bearings.*.minimum_load_ratio", "least", of_parts=True),
-    "bearing_maximum_load_ratio": Quantity("", "bearings.*.maximum_load_ratio", "most", of_parts=True),
+    "bearing_load_ratio": Quantity("", "bearings.*.minimum_load_ratio", "least", of_parts=True, words=LEAST),
+    "bearing_maximum_load_ratio": Quantity("", "bearings.*.maximum_load_ratio", "most", of_parts=True, words=MOST),
     "bearing_uplift_height": Quantity("m", "bearings.*.uplift.height", "most", of_parts=True),
     "bearing_uplift_duration": Quantity("s", "bearings.*.uplift.duration", "most", of_parts=True),
+    "floor_spectra": Quantity("", "floor_spectra", apart=True),  # as JSON: `spectra.kept_spectra`
     "secant_period": Quantity("s", "secant_period", characterised=True),
     "capacity_left": Quantity("m", "capacity_left", "least", characterised=True, where="capacity_left_at"),
 }

@@ -15,7 +15,7 @@ from msfp_gen.buildings import summary as summaries
 from msfp_gen.buildings.extremes import OF_SURFACES, BuildingExtremes, corners, heated, overturning
 from msfp_gen.buildings.notes import notes_of
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.buildings.spectra import FloorSpectra, Steps, floor_spectra
+from msfp_gen.buildings.spectra import FloorSpectra, Steps, floor_spectra, kept_spectra
 from msfp_gen.buildings.summary import BuildingCharacterisation
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
@@ -254,6 +254,10 @@ class BuildingResult(AnyResult):
           the balance of the building [-].
         """
         return summaries.summarise(self)
+
+    def entry(self, key: str) -> Any:
+        """The entry of the summary at a key, or the `floor_spectra` of the row of a suite; None where there is none."""
+        return kept_spectra(self) if key == "floor_spectra" else super().entry(key)
 
     @property
     def floors(self) -> list[dict[str, Any]]:

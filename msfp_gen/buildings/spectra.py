@@ -14,6 +14,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.motions.records.spectrum import displacements
 
 PERIODS = np.geomspace(0.03, 5.0, 120)  # unless others are given [s]
+KEPT = np.geomspace(0.03, 5.0, 40)  # of the spectra in the rows of a suite [s]
 SAMPLE = 1e-3  # between the samples of an acceleration that is linear in every step [s]
 
 
@@ -40,6 +41,24 @@ class FloorSpectra(NamedTuple):
     names: tuple[str, ...]
     nodes: Array
     corners: Array
+
+
+def kept_spectra(result: Any) -> dict[str, Any]:
+    """The spectra of the floors of a `BuildingResult` as plain data, for the row of a suite.
+
+    periods [s], damping [-], floors: name -> the larger of both horizontal directions, and vertical [m/s^2]; of a rigid
+    floor the largest at the corners of the plan.
+    """
+    found = floor_spectra(result, KEPT, 0.05)
+    floors = {
+        name: [_short(corners[:, :2].max(axis=1)), _short(corners[:, 2])]
+        for name, corners in zip(found.names, found.corners, strict=True)
+    }
+    return {"periods": _short(found.periods), "damping": found.damping, "floors": floors}
+
+
+def _short(values: Array) -> list[float]:
+    return [float(f"{value:.5g}") for value in values]
 
 
 def floor_spectra(result: Any, periods: ArrayLike | None, damping: float) -> FloorSpectra:

@@ -217,6 +217,9 @@ def report(
         list[str] | None,
         typer.Option(metavar="RECORD", help="A record of a suite that is not in its report; may be repeated."),
     ] = None,
+    no_runs: Annotated[
+        bool, typer.Option("--no-runs", help="Make no run of a suite again: no loops, nothing on vertical motion.")
+    ] = False,
 ) -> None:
     """Write a run as one HTML file that needs no network: numbers, settings, figures, the bearing in motion.
 
@@ -233,10 +236,13 @@ def report(
     path = check_output(Path(f"{Path(source).stem}.html") if output is None else output, REPORT_SUFFIXES, "--output")
     title = TitleBlock(project, device, date, revision, code, author, checker)
     if is_suite_folder(source):
-        note(f"wrote {write_analysis(source, path, title, leave_out or ())}")
+        with Progress("runs made again") as progress:
+            write_analysis(source, path, title, leave_out or (), loops=not no_runs, progress=progress)
+        note(f"wrote {path}")
         return
-    if leave_out:
-        raise InputError("--leave-out: it is for the report of a suite; give the folder of `bound --suite FILE -o DIR`")
+    if leave_out or no_runs:
+        option = "--leave-out" if leave_out else "--no-runs"
+        raise InputError(f"{option}: it is for the report of a suite; give the folder of `bound --suite FILE -o DIR`")
     result, failure = result_of(load_source(source))
     with Progress("report") as progress:
         write_report(result, path, count, progress, title)

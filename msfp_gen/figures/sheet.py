@@ -17,21 +17,25 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def plot_sheet(report: SheetReport, path: str | Path | None = None) -> Figure:
+def plot_sheet(report: SheetReport, path: str | Path | None = None, *, table: bool = True) -> Figure:
     """Section of the bearing at rest to scale, published backbone at each friction, and table of effective properties.
 
-    path: file to write, .png, .svg or .pdf; None: none. Raises InputError for a path that cannot be written.
+    path: file to write, .png, .svg or .pdf; None: none. table: whether the properties are listed. Raises InputError for
+    a path that cannot be written.
     """
     effective = report.tables[-1]
-    with page(8.6, 8.4 + 0.19 * len(effective.rows), path) as figure:
+    listed = 0.6 + 0.19 * len(effective.rows) if table else 0.0
+    with page(8.6, 7.4 + listed if table else 6.0, path) as figure:
         headline(figure, f"{report.name}: {report.sheet.device} pendulum, {report.sheet.axial_load / 1e3:.4g} kN")
-        ratios = [3.2, 3.6, 0.6 + 0.19 * len(effective.rows)]
-        section, backbone, table = figure.subplots(3, 1, height_ratios=ratios)
+        section, backbone, *below = figure.subplots(2 + table, 1, height_ratios=[3.2, 3.6, listed][: 2 + table])
         _draw_section(section, report)
         _draw_backbone(backbone, report)
-        table.axis("off")
+        if not table:
+            return figure
+        (cells_at,) = below
+        cells_at.axis("off")
         cells = [list(row) for row in effective.rows]
-        drawn = table.table(cells, colLabels=list(effective.columns), loc="upper center", edges="horizontal")
+        drawn = cells_at.table(cells, colLabels=list(effective.columns), loc="upper center", edges="horizontal")
         drawn.auto_set_font_size(False)
         drawn.set_fontsize(SMALL)
         for cell in drawn.get_celld().values():

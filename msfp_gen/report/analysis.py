@@ -1,6 +1,7 @@
 """The report of a whole analysis: the suite at bounds in a folder -> a page of numbered sections, tables and figures.
 
-All numbers are those of the rows that `msfp-gen bound --suite -o` wrote, and of the inputs named in its folder.
+All numbers are those of the rows that `msfp-gen bound --suite -o` wrote, and of the inputs named in its folder, but for
+the runs that `repeated` makes again.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import singledispatch
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,8 +23,10 @@ from msfp_gen.common.tables import Table
 from msfp_gen.common.version import __version__
 from msfp_gen.figures.sheet import plot_sheet
 from msfp_gen.figures.style import CASE_COLOURS, COLOURS, FAINT, INK, THIN, distinct, headline, page, panels, plain
+from msfp_gen.report.compared import compared_table
 from msfp_gen.report.frames import picture, render, write_page
 from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of
+from msfp_gen.report.repeated import Proceed, plot_loops, plot_vertical, repeat_words, repeated, vertical_table
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.sheet import Sheet
@@ -36,23 +40,12 @@ if TYPE_CHECKING:
     from msfp_gen.studies.definition import Study
 
 PERIODS = np.geomspace(0.05, 6.0, 60)  # of the spectra [s]
+SHOWN_PERIODS = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 4.0)  # of the table of floor spectra, about [s]
 Captioned = tuple[str, "Figure"]
 # Quantities of parts, by section: column without its number.
 FLOORS = ("floor_corner_acceleration", "storey_corner_drift_ratio", "storey_shear")
 BEARINGS = ("bearing_displacement", "bearing_load_ratio", "bearing_maximum_load_ratio")
 UPLIFT = ("bearing_uplift_height", "bearing_uplift_duration")
-# What the parts of the program were compared with: part, reference, page of the documentation.
-COMPARED = (
-    ("forces and motions of a bearing", "tests and models of PEER 2017/07 and of Fenz and Constantinou (2008), closed "
-     "forms of friction circles", "validation"),
-    ("solution of the equations", "a second formulation and other integrators on the same scenes, energy balance of "
-     "every run", "verification"),
-    ("bearings in other programs", "elements of OpenSees", "opensees"),
-    ("superstructure on its bearings", "closed forms, an eccentric frame under a record in OpenSees", "buildings"),
-    ("factors of bounds", "the rules of the codes by hand; tables as the literature quotes them", "bounding"),
-    ("response spectra, scaling", "closed forms and an independent integration", "data"),
-    ("effective properties of a sheet", "published devices, by hand", "sheet"),
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -78,7 +71,13 @@ def _no_structure(_: Scene, __: Mapping[str, Any]) -> tuple[list[Table], list[Ca
 
 
 def write_analysis(
-    folder: str | Path, path: str | Path, title: TitleBlock = NO_TITLE, leave_out: Collection[str] = ()
+    folder: str | Path,
+    path: str | Path,
+    title: TitleBlock = NO_TITLE,
+    leave_out: Collection[str] = (),
+    *,
+    loops: bool = True,
+    progress: Proceed | None = None,
 ) -> Path:
     """Write the report of a suite at bounds; the file appears only when complete, and loads no other file.
 
@@ -87,13 +86,23 @@ def write_analysis(
         path: of the page.
         title: what identifies the report.
         leave_out: names of records that are not part of it.
+        loops: whether the runs with the largest displacements are made again, with and without the vertical component
+            of the ground, for their loops and their comparison.
+        progress: called with the share of these runs that is done, and 1.
 
     Raises InputError: as of `load_suite_bounds`, or a path that does not end in .html or cannot be written.
     """
-    return write_page(path, lambda: analysis_html(folder, title, leave_out))
+    return write_page(path, lambda: analysis_html(folder, title, leave_out, loops=loops, progress=progress))
 
 
-def analysis_html(folder: str | Path, title: TitleBlock = NO_TITLE, leave_out: Collection[str] = ()) -> str:
+def analysis_html(
+    folder: str | Path,
+    title: TitleBlock = NO_TITLE,
+    leave_out: Collection[str] = (),
+    *,
+    loops: bool = True,
+    progress: Proceed | None = None,
+) -> str:
     """The report of a suite at bounds as text; arguments and errors as of `write_analysis`."""
     from msfp_gen.studies.assessment.rows import read_study
     from msfp_gen.studies.run import Chunks
@@ -101,8 +110,10 @@ def analysis_html(folder: str | Path, title: TitleBlock = NO_TITLE, leave_out: C
     study, bounds = load_suite_bounds(folder, leave_out)
     rows = read_study(folder)
     rows = rows[~rows["record"].isin(list(leave_out))]
-    scene = study.scene(1)
-    sections = [part for part in _sections(study, bounds, rows, scene) if part.tables or part.figures or part.words]
+    scene = replace(study.scene(1), name=bounds.name)
+    found = [*_sections(study, bounds, rows, scene), *(_runs_again(study, bounds, rows, progress) if loops else ())]
+    found += _last_sections(study, bounds, rows, scene)
+    sections = [part for part in found if part.tables or part.figures or part.words]
     exceeded, failed = bool(bounds.exceeded), bool(bounds.failures or bounds.stopped)
     device = ", ".join(dict.fromkeys(map(kind_of, scene.every_bearing)))
     return render(
@@ -153,15 +164,102 @@ def _sections(study: Study, bounds: SuiteBounds, rows: Any, scene: Any) -> Itera
     yield Section("Superstructure", (), tables, figures)
     yield _motion_section(study, bounds)
     yield _part_section(bounds, "Floor accelerations, drifts and storey shears", FLOORS)
+    yield _spectra_section(rows)
     yield _part_section(bounds, "Displacements and axial forces of the bearings", BEARINGS, _rest(bounds))
     yield _part_section(bounds, "Uplift", UPLIFT)
+
+
+def _runs_again(study: Study, bounds: SuiteBounds, rows: Any, progress: Proceed | None) -> Iterator[Section]:
+    """Loops of the runs with the largest displacements, and what the vertical component does to them."""
+    runs = repeated(study, bounds, rows, progress)
+    if not runs:
+        return
+    caption = "Force over displacement in the runs with the largest displacement, every row of the run"
+    yield Section("Loops", (repeat_words(runs),), (), [(caption, plot_loops(runs, bounds.name or "unnamed scene"))])
+    pairs = [run for run in runs if run.level is not None]
+    if pairs:
+        words = (
+            "The runs of the section before were made once more with the vertical component of the ground at zero. "
+            "Nothing isolates the bearings vertically: the axial forces follow the ground and the vertical modes, and "
+            "the horizontal force of a friction pendulum follows its axial force. The last row says how much of the "
+            "base shear remains beyond this: over the axial forces of the same instant."
+        )
+        caption = "Base shear, axial force and accelerations with the vertical component and without it"
+        figures = [(caption, plot_vertical(pairs))]
+        yield Section("Vertical component of the ground", (words,), [vertical_table(study, pairs)], figures)
+
+
+def _last_sections(study: Study, bounds: SuiteBounds, rows: Any, scene: Any) -> Iterator[Section]:
     yield Section("Energy and numerical error", _energy(rows))
-    words = "Every comparison with its source, tolerance and difference is on the page named, of the documentation."
-    compared = Table(
-        "parts of the program, and what each was compared with", ("part", "compared with", "page"), COMPARED
+    words = (
+        "These comparisons are of the program, in its tests, and none is of this structure. Each page of the "
+        "documentation says what was compared, and how large the differences were."
     )
-    yield Section("Which parts of the program were compared with what", (words,), [compared])
+    kinds = {"building"} if "building" in study.table["scene"] else set()
+    if any("sheet" in given for _, given in _bearings(study.table["scene"])):
+        kinds.add("sheet")
+    yield Section("Which parts of the program were compared with what", (words,), [compared_table(kinds)])
     yield Section("Settings", (), [*explain(scene), _files(study)])
+
+
+def _spectra_section(rows: Any) -> Section:
+    """Floor spectra: means by bound, and the envelope of all runs that reached their end."""
+    if "floor_spectra" not in rows:
+        return Section("Floor spectra")
+    known = rows[(rows["status"] == "ok") & rows["floor_spectra"].notna()]
+    found = {case: list(map(json.loads, known[known["bounds"] == case]["floor_spectra"])) for case in CASES}
+    every = [one for of_case in found.values() for one in of_case]
+    if not every:
+        return Section("Floor spectra")
+    names, periods = list(every[0]["floors"]), np.array(every[0]["periods"])
+    values = {
+        case: np.array([[run["floors"][name] for name in names] for run in of_case])
+        for case, of_case in found.items()
+        if of_case
+    }  # (runs, floors, 2, periods) [m/s^2]
+    envelope = np.concatenate(list(values.values())).max(axis=0)
+    at = [int(np.abs(np.log(periods / period)).argmin()) for period in SHOWN_PERIODS]
+    table = Table(
+        f"envelope of the floor spectra of all {len(every)} runs [g], periods in s",
+        ("floor", "direction", *(f"{periods[index]:.3g}" for index in at), "largest", "at"),
+        [
+            (name if not way else "", ("horizontal", "vertical")[way],
+             *(f"{curve[index] / G:.3f}" for index in at), f"{curve.max() / G:.3f}", f"{periods[curve.argmax()]:.3g}")
+            for name, curves in reversed(list(zip(names, envelope, strict=True)))
+            for way, curve in enumerate(curves)
+        ],
+    )  # fmt: skip
+    damping = 100 * every[0]["damping"]
+    words = (
+        f"Pseudo-acceleration of oscillators with {damping:g} % damping on each floor: the larger of both horizontal "
+        "directions, and vertical, the largest at the corners of the plan.",
+    )
+    caption = "Floor spectra: mean over the records at each bound, and the envelope of all runs"
+    return Section("Floor spectra", words, [table], [(caption, _plot_floor_spectra(names, periods, values, envelope))])
+
+
+def _plot_floor_spectra(names: Sequence[str], periods: Array, values: Mapping[str, Array], envelope: Array) -> Figure:
+    """Floors below each other, the highest first. values: case -> shape (runs, floors, 2, periods) [m/s^2]."""
+    with page(9.5, 1.0 + 1.2 * len(names)) as figure:
+        headline(figure, "Floor spectra")
+        grid = figure.subplots(len(names), 2, squeeze=False, sharex=True, sharey="col")
+        for row, index in zip(grid, reversed(range(len(names))), strict=True):
+            for way, axes in enumerate(row):
+                axes.fill_between(periods, envelope[index, way] / G, color=FAINT, alpha=0.25, label="all runs")
+                for case, of_case in values.items():
+                    mean = of_case[:, index, way].mean(axis=0) / G
+                    axes.plot(periods, mean, color=CASE_COLOURS[case], label=f"mean {case}")
+                axes.set_title(f"{plain(names[index])}, {('horizontal', 'vertical')[way]}")
+                axes.set(xscale="log", xlim=(periods[0], periods[-1]))
+                axes.set_xticks([0.05, 0.1, 0.2, 0.5, 1, 2, 5], ["0.05", "0.1", "0.2", "0.5", "1", "2", "5"])
+                axes.minorticks_off()
+            row[0].set_ylabel("[g]")
+        for axes in grid[-1]:
+            axes.set_xlabel("period T [s]")
+            axes.set_ylim(bottom=0.0)
+        handles, labels = grid[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper right", ncols=4)
+    return figure
 
 
 def _lead(bounds: SuiteBounds, rows: Any) -> str:
@@ -227,7 +325,8 @@ def _bearing_section(study: Study, scene: Any) -> Section:
         data: Sheet = parsed_sheet(given)
         report = SheetReport(name, data, bearing_from_table(given))
         tables += report.tables
-        figures.append((f"{name}: section to scale, published backbone and effective properties", plot_sheet(report)))
+        caption = f"{name}: section to scale, published backbone; dots: displacements of the effective properties"
+        figures.append((caption, plot_sheet(report, table=False)))
     words = () if tables else ("The bearing is given surface by surface: see Settings.",)
     return Section("Bearing", words, tables, figures)
 
@@ -286,7 +385,7 @@ def _plot_spectra(
     vertical: Mapping[str, Array],
     between: tuple[float, float] | None,
 ) -> Figure:
-    with page(11.5, 4.6) as figure:
+    with page(9.5, 4.6) as figure:
         headline(figure, "Spectra of the scaled ground motions")
         row = panels(figure, f"horizontal, {component}", "vertical")
         colours = distinct(len(horizontal))
@@ -336,9 +435,9 @@ def _part_section(bounds: SuiteBounds, title: str, quantities: Sequence[str], wo
 
 def _plot_parts(bounds: SuiteBounds, drawn: Mapping[str, Sequence[Any]], title: str) -> Figure:
     most = max(map(len, drawn.values()))
-    with page(11.5, 2.2 + 0.16 * min(max(most, 8), 40)) as figure:
+    with page(9.5, 2.2 + 0.16 * min(max(most, 8), 40)) as figure:
         headline(figure, title)
-        row = panels(figure, *(_words_of(bounds, parts[0]) for parts in drawn.values()))
+        row = panels(figure, *(fill(_words_of(bounds, parts[0]), 26) for parts in drawn.values()))
         for axes, parts in zip(row, drawn.values(), strict=True):
             unit, scale = shown_as(parts[0].unit)
             place = np.arange(len(parts))
@@ -373,8 +472,8 @@ def _energy(rows: Any) -> list[str]:
         return []
     worst = rows.loc[error.idxmax()]
     lines = [
-        "The energy of every run is balanced: work of the ground and the loads, less what is stored and dissipated. "
-        f"What remains is an error of the computation: at most {100 * error.max():.2g} % of the peak energy "
+        "In every run the work of the ground and the loads was compared with all energy that is stored and dissipated. "
+        f"The difference is an error of the computation: at most {100 * error.max():.2g} % of the peak energy "
         f"({worst['record']}, {worst['bounds']}), {100 * error.median():.2g} % in the median run."
     ]
     lines.append(f"The runs took {int(rows['steps'].min())} to {int(rows['steps'].max())} time steps.")

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output, write_bytes
+from msfp_gen.common.tables import Table
 from msfp_gen.common.version import __version__
 from msfp_gen.figures.style import colour
 from msfp_gen.results.geometry import POINTS, Poses, friction_circles, outline, poses
@@ -170,8 +171,14 @@ def render(template: str, **values: Any) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True, loader=FunctionLoader(asset)
     )
+    environment.filters["of_texts"] = of_texts
     page = environment.get_template(template) if template.endswith(".jinja") else environment.from_string(template)
     return page.render(version=__version__, style=Markup(asset("page.css")), **values)
+
+
+def of_texts(table: Table) -> list[bool]:
+    """Whether each column of a table has texts rather than numbers, so that its cells begin at the left."""
+    return [any(cell[:1].isalpha() for cell in column) for column in zip(*table.rows, strict=True)]
 
 
 def picture(title: str, figure: Figure) -> dict[str, str]:

@@ -21,6 +21,7 @@ class Quantity(NamedTuple):
     bounds do not. kept: whether a study keeps it where its file names no quantities. extreme: whether it is the largest
     or the least value over the run; None: as `governs`. words: in tables and figures, in place of those of the column.
     where: attribute of the characterisation that names the place of the value, and its share of what is allowed there.
+    apart: whether it is no part of the summary, and made only where a study keeps it.
     """
 
     unit: str
@@ -33,6 +34,7 @@ class Quantity(NamedTuple):
     extreme: Side | None = None
     words: str = ""
     where: str = ""
+    apart: bool = False
 
     @property
     def side(self) -> Side:

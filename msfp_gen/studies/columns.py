@@ -41,7 +41,7 @@ EXTREMES: dict[str, Callable[[Any], Any]] = {
     "last": lambda values: values[-1],
 }
 _EXTREME = re.compile(rf"\b({'|'.join(EXTREMES)})\(\s*([^()]*?)\s*\)")
-TEXTS = ("rims_met", "verdict", "verdict_text", "limits_exceeded", "limits_reached")
+TEXTS = ("rims_met", "verdict", "verdict_text", "limits_exceeded", "limits_reached", "floor_spectra")
 _LEFT_OUT = ("status", "message")  # every row has them
 _OPERATIONS = {**formula.FLOAT_OPERATIONS, "power": math.pow}
 

@@ -135,7 +135,7 @@ def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> 
     for row in rows:
         sources = quantities(row.variation.scene) | sources
     for column, source in sources.items():
-        if source.quantity.characterised:
+        if source.quantity.characterised or source.quantity.apart:
             continue
         values = [plain_cell(source.value(row.summary.get, None)) for row in rows]
         if source.place is None or any(value is not None for value in values):

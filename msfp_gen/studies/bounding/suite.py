@@ -37,6 +37,7 @@ Run = tuple[str, str]  # names of a record and of a case
 
 # Quantities of the figure, where the runs have them.
 DRAWN = ("peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "capacity_left")
+IN_ROW, MOST_BELOW = 3, 14  # panels of the figure in a row; entries of the legend below each other
 WORST: dict[str, Callable[..., Any]] = {"most": np.nanmax, "least": np.nanmin}
 # Kept beside the quantities of which a value governs.
 OF_RUN = ("duration", "verdict", "verdict_text", "limits_reached", "closure_error", "steps")
@@ -183,7 +184,8 @@ def suite_study(
     }
     study = load_study(table, progress)
     governing = {name: source for name, source in study.keep.sources if source.quantity.governs}
-    names = (*names_of(governing), *OF_RUN)
+    apart = {name: source for name, source in study.keep.sources if source.quantity.apart}
+    names = (*names_of(governing), *OF_RUN, *names_of(apart))
     return replace(study, keep=replace(study.keep, names=names), table={**study.table, "keep": list(names)})
 
 
@@ -424,13 +426,16 @@ def plot_suite_bounds(bounds: SuiteBounds, path: str | Path | None = None) -> Fi
     """
     plotted = [name for name in DRAWN if name in bounds.values and not np.isnan(bounds.values[name]).all()]
     colours = distinct(len(bounds.records))
-    with page(3.4 * len(plotted) + 2.2, 4.4, path, "suite") as figure:
+    rows = 1 + len(plotted) // IN_ROW
+    with page(9.5, 0.6 + 2.7 * rows, path, "suite") as figure:
         headline(figure, f"{bounds.name or 'unnamed scene'}: {_counted(bounds)} at bounds by {bounds.factors}")
-        row = figure.subplots(1, len(plotted), squeeze=False)[0]
-        for axes, name in zip(row, plotted, strict=True):
+        cells = list(figure.subplots(rows, IN_ROW, squeeze=False).flat)
+        for axes, name in zip(cells, plotted, strict=False):
             _draw(axes, bounds, name, colours)
-        handles, labels = row[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside right center")
+        for axes in cells[len(plotted) :]:
+            axes.set_axis_off()
+        handles, labels = cells[0].get_legend_handles_labels()
+        cells[len(plotted)].legend(handles, labels, loc="center left", ncols=1 + (len(labels) > MOST_BELOW))
     return figure
 
 

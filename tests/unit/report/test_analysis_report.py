@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,13 @@ import numpy as np
 import pytest
 from support import ROOT
 
-from msfp_gen import InputError, simulate
+from msfp_gen import InputError, load_scene, simulate
 from msfp_gen.buildings.modes import modes_of
 from msfp_gen.cli import main
 from msfp_gen.report import TitleBlock, analysis_html, write_analysis
-from msfp_gen.report.analysis import COMPARED, limit_table
+from msfp_gen.report.analysis import limit_table
+from msfp_gen.report.compared import COMPARISONS, compared_table
+from msfp_gen.report.repeated import has_vertical, shear_share
 from msfp_gen.scene.file.source import scene_of
 from msfp_gen.studies.assessment.rows import read_study
 from msfp_gen.studies.bounding import CASES, bound_suite, load_suite_bounds, suite_study
@@ -70,7 +73,10 @@ def texts(html: str) -> str:
 def test_parts_of_the_report_are_numbered_and_listed(html: str) -> None:
     titles = re.findall(r'<h2 id="part-(\d+)">\d+\. (.*?)</h2>', html)
     assert [int(number) for number, _ in titles] == list(range(1, len(titles) + 1))
-    wanted = ("Envelope", "Bearing", "Superstructure", "Ground motions", "Floor", "Displacements", "Energy", "Which")
+    wanted = (
+        "Envelope", "Bearing", "Superstructure", "Ground motions", "Floor acc", "Floor spectra", "Displacements",
+        "Loops", "Vertical", "Energy", "Which", "Settings",
+    )  # fmt: skip
     found = [title for _, title in titles]
     assert [next(title for title in found if title.startswith(word)) for word in wanted]
     contents = html[html.index('class="contents"') : html.index('id="part-1"')]
@@ -86,7 +92,9 @@ def test_page_one_names_inputs_author_and_checker(html: str, folder: Path) -> No
     assert "author A. Author date, signature" in text and "checker date, signature" in text
     assert text.count("A. Author") == 1 and "project Block B" in text
     assert "All 6 runs reached their end; none exceeded a limit of the device." in text
-    assert analysis_html(folder, TITLE) == html, "the page depends on the folder alone"
+    short = analysis_html(folder, TITLE, loops=False)
+    assert analysis_html(folder, TITLE, loops=False) == short, "the page depends on the folder alone"
+    assert "Loops" not in short and "Loops" in html
 
 
 def test_the_report_loads_nothing_and_escapes_names(html: str, folder: Path) -> None:
@@ -117,6 +125,45 @@ def test_shares_of_limits_are_those_of_the_runs(folder: Path) -> None:
         assert float(upper.removesuffix(" %")) == pytest.approx(100 * share, rel=6e-3, abs=1e-9)
 
 
+def test_envelope_of_floor_spectra_is_that_of_the_runs(html: str, folder: Path) -> None:
+    """The largest ordinate over all runs, from runs made again and their spectra at other periods."""
+    study, _ = load_suite_bounds(folder)
+    periods = np.geomspace(0.03, 5.0, 40)
+    curves = [simulate(study.scene(run)).floor_spectra(periods).corners[-1] for run in range(1, 7)]
+    top = np.max(curves, axis=0)
+    row = next(line for line in re.findall(r"<tr>(.*?)</tr>", html) if "floor 2</th>" in line and "horizontal" in line)
+    cells = [cell for cell in texts(row).split() if re.fullmatch(r"[\d.]+", cell)]
+    horizontal = top[:, :2].max(axis=1)
+    assert float(cells[-2]) == pytest.approx(horizontal.max() / 9.80665, abs=6e-4)
+    assert float(cells[-1]) == pytest.approx(periods[horizontal.argmax()], rel=6e-3)
+
+
+def test_vertical_component_is_what_differs(html: str, folder: Path) -> None:
+    """The run with the largest displacement at nominal values, and the same on a ground that moves in the plane."""
+    study, bounds = load_suite_bounds(folder)
+    record = int(bounds.values["peak_displacement"][:, CASES.index("nominal")].argmax())
+    scene = study.scene(1 + CASES.index("nominal") + len(CASES) * record)
+    coefficients = scene.motion.coefficients * np.array([1.0, 1.0, 0.0, 1.0, 1.0, 1.0])[:, None]
+    plane = simulate(replace(scene, motion=replace(scene.motion, coefficients=coefficients)))
+    whole = bounds.values["peak_force"][record, CASES.index("nominal")] / 1e3
+    row = next(line for line in re.findall(r"<tr>(.*?)</tr>", html[html.index("Vertical component") :])
+               if "peak base shear [kN]" in line)  # fmt: skip
+    _, _, _, found, without, ratio, *_ = re.findall(r"<td>([\d.]+)</td>", row)
+    assert float(found) == pytest.approx(whole, rel=6e-4)
+    assert float(without) == pytest.approx(plane.summary["peak_force"]["radial"] / 1e3, rel=6e-4)
+    assert float(ratio) == pytest.approx(float(found) / float(without), abs=6e-3)
+    assert "were compared, each equal to its row" in texts(html)
+
+
+def test_shear_over_axial_force_is_the_friction_of_a_rigid_slope() -> None:
+    """Of one pendulum in steady sliding: friction plus the slope of the dish, whatever its axial force."""
+    result = simulate(replace(load_scene("fenz-test2"), duration=None))
+    forces = np.abs(result.history.top_force)
+    share = (np.hypot(forces[:, 0], forces[:, 1]) / forces[:, 2]).max()
+    assert shear_share(result) == pytest.approx(share, rel=1e-12)
+    assert not has_vertical(result.scene.motion)
+
+
 def test_target_and_sheet_are_on_the_page(html: str) -> None:
     text = texts(html)
     assert "target: rotd100 to the ASCE 7 spectrum of 9.807 and 5.884 m/s^2, least squares from 1 to 3 s" in text
@@ -143,7 +190,7 @@ def test_modes_are_those_of_closed_form() -> None:
 
 
 def test_a_record_left_out_is_not_in_the_report(folder: Path, tmp_path: Path) -> None:
-    assert main(["report", str(folder), "-o", str(tmp_path / "a.html"), "--leave-out", "CCC"]) == 0
+    assert main(["report", str(folder), "-o", str(tmp_path / "a.html"), "--leave-out", "CCC", "--no-runs"]) == 0
     text = texts((tmp_path / "a.html").read_text(encoding="utf-8"))
     assert "1 ground motion, CCC left out" in text
     assert "3 nonlinear response histories" in text
@@ -158,6 +205,7 @@ def cases(folder: Path, copy: Path) -> Iterator[tuple[list[str], str]]:
     (copy / "study.toml").write_text(study.replace('mass = "110 t"', 'mass = "120 t"'), encoding="utf-8")
     yield [str(copy)], "inputs or program have changed"
     yield ["fenz-test2", "--leave-out", "CCC"], "give the folder of `bound --suite"
+    yield ["fenz-test2", "--no-runs"], "--no-runs: it is for the report of a suite"
 
 
 def test_what_cannot_be_reported_is_one_line(folder: Path, tmp_path: Path, capsys: Any) -> None:
@@ -174,5 +222,13 @@ def test_what_cannot_be_reported_is_one_line(folder: Path, tmp_path: Path, capsy
         write_analysis(folder, tmp_path / "page.txt")
 
 
-def test_what_was_compared_stands_on_pages_that_exist() -> None:
-    assert all((ROOT / "docs" / f"{page}.md").is_file() for _, _, page in COMPARED)
+def test_what_was_compared_is_what_tests_compare() -> None:
+    """Every page names the tests, or a test of the page makes its numbers again; and the tests are there."""
+    for one in COMPARISONS:
+        page = (ROOT / "docs" / f"{one.page}.md").read_text(encoding="utf-8")
+        for test in one.tests:
+            path = ROOT / "tests" / test
+            assert re.search(r"^def test_", path.read_text(encoding="utf-8"), re.MULTILINE), test
+            assert path.name in page or path.name == f"test_{one.page}_page.py", f"{test} is not on the page {one.page}"
+    parts = [row[0] for row in compared_table(set()).rows]
+    assert "superstructure on its bearings" not in parts and len(parts) < len(COMPARISONS)
