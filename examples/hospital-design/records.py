@@ -18,7 +18,7 @@ STEP, DURATION = 0.01, 20.0  # [s]
 PERIODS = np.geomspace(0.04, 6.0, 60)  # at which spectra are compared [s]
 LONGEST = 7.0  # period beyond which there is no motion [s]
 G = 9.80665
-TARGET = ScaleTo(sds=1.4 * G, sd1=0.7 * G, between=(1.5, 4.5))  # as in suite.toml
+TARGET = ScaleTo(sds=1.0 * G, sd1=0.5 * G, between=(1.5, 4.5))  # as in suite.toml
 SCATTER, ROUNDS = 0.25, 8  # standard deviation of the logarithm of a spectrum [-]; rounds of adjustment
 
 
@@ -29,11 +29,11 @@ def envelope(time: np.ndarray) -> np.ndarray:
 
 
 def target(vertical: bool) -> np.ndarray:
-    """Pseudo-acceleration of a component at PERIODS [m/s^2]; of the vertical one that of periods three times as long."""
+    """Pseudo-acceleration of a component at PERIODS [m/s^2]; of the vertical one at three times the period."""
     period, values = TARGET.curve(PERIODS)
     if not vertical:
-        return 0.8 * np.interp(PERIODS, period, values)  # of one component, where the mean of both meets the target
-    return 0.55 * np.interp(np.minimum(3.0 * PERIODS, PERIODS[-1]), PERIODS, np.interp(PERIODS, period, values))
+        return np.interp(PERIODS, period, values)
+    return 0.6 * np.interp(np.minimum(3.0 * PERIODS, PERIODS[-1]), PERIODS, np.interp(PERIODS, period, values))
 
 
 def artificial(seed: int) -> np.ndarray:

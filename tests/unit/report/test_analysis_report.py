@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Iterator
@@ -42,6 +43,7 @@ SHEET = {
     "dish_diameter": [0.9, 0.27],
     "axial_load": 760e3,
 }
+NOMINAL = CASES.index("nominal")
 TITLE = TitleBlock(project="Block B", author="A. Author")
 
 
@@ -125,39 +127,52 @@ def test_shares_of_limits_are_those_of_the_runs(folder: Path) -> None:
         assert float(upper.removesuffix(" %")) == pytest.approx(100 * share, rel=6e-3, abs=1e-9)
 
 
-def test_envelope_of_floor_spectra_is_that_of_the_runs(html: str, folder: Path) -> None:
-    """The largest ordinate over all runs, from runs made again and their spectra at other periods."""
-    study, _ = load_suite_bounds(folder)
-    periods = np.geomspace(0.03, 5.0, 40)
-    curves = [simulate(study.scene(run)).floor_spectra(periods).corners[-1] for run in range(1, 7)]
-    top = np.max(curves, axis=0)
-    row = next(line for line in re.findall(r"<tr>(.*?)</tr>", html) if "floor 2</th>" in line and "horizontal" in line)
-    cells = [cell for cell in texts(row).split() if re.fullmatch(r"[\d.]+", cell)]
-    horizontal = top[:, :2].max(axis=1)
-    assert float(cells[-2]) == pytest.approx(horizontal.max() / 9.80665, abs=6e-4)
-    assert float(cells[-1]) == pytest.approx(periods[horizontal.argmax()], rel=6e-3)
-
-
-def test_vertical_component_is_what_differs(html: str, folder: Path) -> None:
-    """The run with the largest displacement at nominal values, and the same on a ground that moves in the plane."""
+@pytest.fixture(scope="module")
+def largest(folder: Path) -> tuple[int, Any]:
+    """Index of the record with the largest displacement at nominal values, and its run made again."""
     study, bounds = load_suite_bounds(folder)
-    record = int(bounds.values["peak_displacement"][:, CASES.index("nominal")].argmax())
-    scene = study.scene(1 + CASES.index("nominal") + len(CASES) * record)
-    coefficients = scene.motion.coefficients * np.array([1.0, 1.0, 0.0, 1.0, 1.0, 1.0])[:, None]
-    plane = simulate(replace(scene, motion=replace(scene.motion, coefficients=coefficients)))
-    whole = bounds.values["peak_force"][record, CASES.index("nominal")] / 1e3
-    row = next(line for line in re.findall(r"<tr>(.*?)</tr>", html[html.index("Vertical component") :])
-               if "peak base shear [kN]" in line)  # fmt: skip
-    _, _, _, found, without, ratio, *_ = re.findall(r"<td>([\d.]+)</td>", row)
-    assert float(found) == pytest.approx(whole, rel=6e-4)
-    assert float(without) == pytest.approx(plane.summary["peak_force"]["radial"] / 1e3, rel=6e-4)
-    assert float(ratio) == pytest.approx(float(found) / float(without), abs=6e-3)
+    record = int(bounds.values["peak_displacement"][:, NOMINAL].argmax())
+    return record, simulate(study.scene(1 + NOMINAL + len(CASES) * record))
+
+
+def test_envelope_of_floor_spectra_is_that_of_the_runs(html: str, folder: Path, largest: tuple[int, Any]) -> None:
+    """A row has the spectra of its run; the table has the largest ordinate over all rows."""
+    record, result = largest
+    rows = [json.loads(text)["floors"] for text in read_study(folder)["floor_spectra"]]
+    periods = np.geomspace(0.03, 5.0, 40)
+    corners = result.floor_spectra(periods).corners[-1]
+    own = np.stack([corners[:, :2].max(axis=1), corners[:, 2]])
+    assert np.array(rows[NOMINAL + len(CASES) * record]["floor 2"]) == pytest.approx(own, rel=1e-4)
+    top = np.max([row["floor 2"][0] for row in rows], axis=0)
+    line = next(line for line in table_rows(html, "Floor spectra") if "floor 2</th>" in line)
+    cells = re.findall(r"<td>([\d.]+)</td>", line)
+    assert float(cells[-2]) == pytest.approx(top.max() / 9.80665, abs=6e-4)
+    assert float(cells[-1]) == pytest.approx(periods[top.argmax()], rel=6e-3)
+
+
+def test_vertical_component_is_what_differs(html: str, folder: Path, largest: tuple[int, Any]) -> None:
+    """The run with the largest displacement, and the same on a ground that moves in the plane alone."""
+    _, result = largest
+    coefficients = result.scene.motion.coefficients * np.array([1.0, 1.0, 0.0, 1.0, 1.0, 1.0])[:, None]
+    plane = simulate(replace(result.scene, motion=replace(result.scene.motion, coefficients=coefficients)))
+    line = next(line for line in table_rows(html, "Vertical component") if "peak base shear [kN]" in line)
+    _, _, _, found, without, ratio, *_ = map(float, re.findall(r"<td>([\d.]+)</td>", line))
+    assert found == pytest.approx(result.summary["peak_force"]["radial"] / 1e3, rel=6e-4)
+    assert without == pytest.approx(plane.summary["peak_force"]["radial"] / 1e3, rel=6e-4)
+    assert ratio == pytest.approx(found / without, abs=6e-3)
     assert "were compared, each equal to its row" in texts(html)
+
+
+def table_rows(html: str, title: str) -> list[str]:
+    """The rows of the tables of a section."""
+    start = re.search(rf"<h2 [^>]*>\d+\. {title}", html)
+    assert start
+    return re.findall(r"<tr>(.*?)</tr>", html[start.end() : html.index("</section>", start.end())])
 
 
 def test_shear_over_axial_force_is_the_friction_of_a_rigid_slope() -> None:
     """Of one pendulum in steady sliding: friction plus the slope of the dish, whatever its axial force."""
-    result = simulate(replace(load_scene("fenz-test2"), duration=None))
+    result = simulate(load_scene("fenz-test2"))
     forces = np.abs(result.history.top_force)
     share = (np.hypot(forces[:, 0], forces[:, 1]) / forces[:, 2]).max()
     assert shear_share(result) == pytest.approx(share, rel=1e-12)
