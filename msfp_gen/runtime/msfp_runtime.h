@@ -218,6 +218,8 @@ void msfp_named_vectors(const msfp_parameters *p, const msfp_point *at, double *
 int msfp_lu(double *matrix, int n, int *pivots);
 /* Solve with those factors, in place of rhs [n]. */
 void msfp_lu_solve(const double *matrix, int n, const int *pivots, double *rhs);
+/* The same of the factors of a step, for columns [MSFP_DOF][width] at once. */
+void msfp_lu_solve_columns(const double *matrix, const int *pivots, int width, double *columns);
 
 /* ---- energies and rows of output ------------------------------------------------------------ */
 

@@ -47,21 +47,23 @@ MSFP_INLINE int factors(double *matrix, int n, int *pivots)
     return sign;
 }
 
-/* Forward substitution runs column by column: its updates do not depend on each other. */
-MSFP_INLINE void solution(const double *matrix, int n, const int *pivots, double *rhs)
+/* Forward substitution runs column by column: its updates do not depend on each other. rhs: [n][width] */
+MSFP_INLINE void solution(const double *matrix, int n, const int *pivots, int width, double *rhs)
 {
-    for (int k = 0; k < n; ++k) {
-        const double swap = rhs[pivots[k]];
-        rhs[pivots[k]] = rhs[k];
-        rhs[k] = swap;
-    }
+    for (int k = 0; k < n; ++k)
+        for (int c = 0; c < width; ++c) {
+            const double swap = rhs[pivots[k] * width + c];
+            rhs[pivots[k] * width + c] = rhs[k * width + c];
+            rhs[k * width + c] = swap;
+        }
     for (int j = 0; j < n; ++j)
         for (int i = j + 1; i < n; ++i)
-            rhs[i] -= matrix[i * n + j] * rhs[j];
+            subtract(rhs + i * width, rhs + j * width, matrix[i * n + j], width);
     for (int i = n - 1; i >= 0; --i) {
         for (int j = i + 1; j < n; ++j)
-            rhs[i] -= matrix[i * n + j] * rhs[j];
-        rhs[i] *= matrix[i * n + i];
+            subtract(rhs + i * width, rhs + j * width, matrix[i * n + j], width);
+        for (int c = 0; c < width; ++c)
+            rhs[i * width + c] *= matrix[i * n + i];
     }
 }
 
@@ -74,7 +76,18 @@ MSFP_WIDE int msfp_lu(double *matrix, int n, int *pivots)
 MSFP_WIDE void msfp_lu_solve(const double *matrix, int n, const int *pivots, double *rhs)
 {
     if (n == MSFP_DOF)
-        solution(matrix, MSFP_DOF, pivots, rhs);
+        solution(matrix, MSFP_DOF, pivots, 1, rhs);
     else
-        solution(matrix, n, pivots, rhs);
+        solution(matrix, n, pivots, 1, rhs);
+}
+
+MSFP_WIDE void msfp_lu_solve_columns(const double *matrix, const int *pivots, int width, double *columns)
+{
+#if MSFP_GRADIENTS /* with as many columns the compiler unrolls the loops too */
+    if (width == MSFP_COLUMNS) {
+        solution(matrix, MSFP_DOF, pivots, MSFP_COLUMNS, columns);
+        return;
+    }
+#endif
+    solution(matrix, MSFP_DOF, pivots, width, columns);
 }

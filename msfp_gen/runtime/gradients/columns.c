@@ -169,34 +169,6 @@ MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_param
     }
 }
 
-/* As msfp_lu_solve for all columns at once. */
-MSFP_WIDE void msfp_solve_columns(const double *restrict factors, const int *restrict pivots,
-                                  msfp_columns *restrict columns)
-{
-    enum { PACKS = C / MSFP_PACK_SIZE };
-    msfp_pack *const x = (msfp_pack *)columns;
-    for (int k = 0; k < DOF; ++k)
-        for (int c = 0; c < PACKS; ++c) {
-            const msfp_pack swap = x[pivots[k] * PACKS + c];
-            x[pivots[k] * PACKS + c] = x[k * PACKS + c];
-            x[k * PACKS + c] = swap;
-        }
-    for (int c = 0; c < PACKS; ++c) {
-        for (int i = 1; i < DOF; ++i) {
-            msfp_pack rest = x[i * PACKS + c];
-            for (int j = 0; j < i; ++j)
-                rest -= factors[i * DOF + j] * x[j * PACKS + c];
-            x[i * PACKS + c] = rest;
-        }
-        for (int i = DOF - 1; i >= 0; --i) {
-            msfp_pack rest = x[i * PACKS + c];
-            for (int j = i + 1; j < DOF; ++j)
-                rest -= factors[i * DOF + j] * x[j * PACKS + c];
-            x[i * PACKS + c] = rest * factors[i * DOF + i];
-        }
-    }
-}
-
 MSFP_WIDE void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[NB][2], msfp_columns f[NB][2])
 {
     for (int j = 0; j < NB; ++j)

@@ -85,8 +85,6 @@ enum { MSFP_OF_RESIDUAL = 1, MSFP_OF_ROW = 2 };
 void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_stage_weights *weights, const msfp_work *w,
                             const msfp_slopes *slopes, int wanted, msfp_work_columns *d);
-/* Solve factors x = columns [MSFP_DOF][MSFP_COLUMNS], in place. */
-void msfp_solve_columns(const double *factors, const int *pivots, msfp_columns *columns);
 /* Columns of the rates of Y, Z, and where f is given of Y, Z. */
 void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[MSFP_NB][2], msfp_columns f[MSFP_NB][2]);
 

@@ -9,8 +9,6 @@
 #if MSFP_GRADIENTS
 #include "msfp_gradient_kernels.h"
 
-static const int unknown[ND] = MSFP_FREE;
-
 /* Third derivative of a history at its last search. */
 MSFP_INLINE void third_derivative(const msfp_history *h, double t, double out[6])
 {
@@ -104,10 +102,8 @@ int msfp_initial_columns(msfp_run *run, msfp_parameter_batch *batch, int first)
     if (!MSFP_MASSLESS) {
         if (msfp_lu(stage_history->factors[0], DOF, stage_history->pivots[0]) == 0)
             return MSFP_E_IRREGULAR;
-        msfp_solve_columns(stage_history->factors[0], stage_history->pivots[0], batch->work.residual);
-        for (int k = 0; k < NB; ++k)
-            for (int i = 0; i < ND; ++i)
-                msfp_add_columns(&now->a[k][unknown[i]], &batch->work.residual[k * ND + i], -1.0, 1);
+        msfp_lu_solve_columns(stage_history->factors[0], stage_history->pivots[0], C, batch->work.residual[0]);
+        msfp_move_rates(now->a[0][0], batch->work.residual[0], 1.0, C);
         memcpy(dat->a, now->a, sizeof dat->a);
         msfp_condensed_columns(p, dp, &at, dat, &weights, w, slopes, MSFP_OF_RESIDUAL, &batch->work);
     }

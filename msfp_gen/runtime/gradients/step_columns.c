@@ -55,7 +55,7 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_parameter_batch *batch, int i, 
     const msfp_stage_history *stage_history = &run->gradients->stage_history;
     const msfp_stage *stage = &stage_history->stage[i];
     msfp_point_columns *dat = &batch->point;
-    msfp_columns *x = batch->work.residual;
+    double *x = batch->work.residual[0];
     memcpy(dat->v, batch->now.v, sizeof dat->v); /* of a locked spin */
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
@@ -63,10 +63,8 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_parameter_batch *batch, int i, 
     stage_point_columns(run, i, from, dat);
     msfp_condensed_columns(&run->parameters, &batch->parameters, &stage->at, dat, &stage->weights,
                            &stage_history->work[i], &stage_history->slopes[i], MSFP_OF_RESIDUAL, &batch->work);
-    msfp_solve_columns(stage_history->factors[i], stage_history->pivots[i], x);
-    for (int k = 0; k < NB; ++k)
-        for (int d = 0; d < ND; ++d)
-            msfp_add_columns(&dat->v[k][unknown[d]], &x[k * ND + d], -1.0, 1);
+    msfp_lu_solve_columns(stage_history->factors[i], stage_history->pivots[i], C, x);
+    msfp_move_rates(dat->v[0][0], x, 1.0, C);
     stage_point_columns(run, i, from, dat);
     batch->complete = 0;
 }

@@ -137,27 +137,23 @@ static void rest_of_stage(const state_columns *known, double beta, const msfp_by
     msfp_add(stage->foot[0], stage->dfoot[0], beta, 2 * W);
 }
 
-/* Derivatives of the rates of the stage: -(dr/dv)^-1 dr, with r the balances over N as Newton's method divides them. */
+/* Derivatives of the rates of the stage, by the tangent of the balances as Newton's method divides them. */
 static void solve(const msfp_run *run, const double *residual, const msfp_by_ends *d, state_columns *stage)
 {
-    for (int c = 0; c < W; ++c) {
-        double x[DOF];
-        for (int k = 0; k < NB; ++k)
-            for (int i = 0; i < ND; ++i) {
-                double *one = x + k * ND + i;
+    double x[DOF * W];
+    for (int k = 0; k < NB; ++k) {
+        double *own = x + k * ND * W;
+        memcpy(own, d->angular[k + 1], NA * sizeof(columns));
 #if MSFP_UPLIFT
-                *one = i < NA ? d->angular[k + 1][i * W + c] : d->excess[k][(i - NA) * W + c];
+        memcpy(own + NA * W, d->excess[k], (ND - NA) * sizeof(columns));
+        (void)residual;
 #else
-                *one = (d->angular[k + 1][i * W + c] - residual[k * ND + i] * d->contact[k][MSFP_CONTACT_N * W + c])
-                       / run->work.contact[k][MSFP_CONTACT_N];
+        msfp_divide_columns(run->work.contact[k][MSFP_CONTACT_N], residual + k * ND, d->contact[k] + MSFP_CONTACT_N * W, W,
+                            own);
 #endif
-            }
-        msfp_lu_solve(run->factors, DOF, run->pivots, x);
-        for (int k = 0; k < NB; ++k)
-            for (int i = 0; i < ND; ++i)
-                stage->v[k][unknown[i]][c] = -x[k * ND + i];
     }
-    (void)residual;
+    msfp_lu_solve_columns(run->factors, run->pivots, W, x);
+    msfp_move_rates(stage->v[0][0], x, 1.0, W);
 }
 
 /* Stage i, which is solved and whose tangent is factored. residual: what is left of it over N; basis: the channels of
@@ -305,14 +301,12 @@ static void solve_moves(msfp_port *port, const msfp_by_ends *d)
             memcpy(moment + i * DOF, d->moment[NB] + i * W + EACH + begin, count * sizeof *moment);
         }
         msfp_load_tangent(&run->parameters, &run->work, force, moment, found);
-        for (int c = 0; c < count; ++c) {
-            double x[DOF];
-            for (int i = 0; i < DOF; ++i)
-                x[i] = -found[i * DOF + c] / (MSFP_UPLIFT ? 1.0 : run->work.contact[i / ND][MSFP_CONTACT_N]);
-            msfp_lu_solve(run->factors, DOF, run->pivots, x);
-            for (int i = 0; i < DOF; ++i)
-                port->step.moves[i][begin + c] = x[i];
-        }
+        for (int i = 0; i < DOF * DOF && !MSFP_UPLIFT; ++i)
+            found[i] /= run->work.contact[i / (ND * DOF)][MSFP_CONTACT_N];
+        msfp_lu_solve_columns(run->factors, run->pivots, DOF, found);
+        for (int i = 0; i < DOF; ++i)
+            for (int c = 0; c < count; ++c)
+                port->step.moves[i][begin + c] = -found[i * DOF + c];
     }
     port->step.moved = 1;
 }

@@ -46,12 +46,9 @@ static void divide_tangent_by_normal(const msfp_work *w, const double *residual,
 {
     if (MSFP_UPLIFT)
         return;
-    for (int k = 0; k < NB; ++k) {
-        const double inverse = 1.0 / w->contact[k][MSFP_CONTACT_N];
-        for (int i = k * ND; i < (k + 1) * ND; ++i)
-            for (int c = 0; c < DOF; ++c)
-                tangent[i * DOF + c] = inverse * (tangent[i * DOF + c] - residual[i] * w->dnormal[k][c]);
-    }
+    for (int k = 0; k < NB; ++k)
+        msfp_divide_columns(w->contact[k][MSFP_CONTACT_N], residual + k * ND, w->dnormal[k], DOF,
+                            tangent + k * ND * DOF);
 }
 
 /* Residual over N, its largest entry relative to its natural size and the tangent (or NULL). Returns a status. */
@@ -83,9 +80,7 @@ double msfp_stage_residual(msfp_run *run, msfp_stage *s, msfp_work *w, double *r
 
 void msfp_stage_move(msfp_stage *s, const double *step, double factor)
 {
-    for (int k = 0; k < NB; ++k)
-        for (int i = 0; i < ND; ++i)
-            s->at.v[k][unknown[i]] -= factor * step[k * ND + i];
+    msfp_move_rates(s->at.v[0], step, factor, 1);
 }
 
 int msfp_factorise_stage(msfp_run *run, msfp_stage *s, double *residual, double *size)

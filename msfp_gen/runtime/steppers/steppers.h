@@ -131,6 +131,25 @@ enum msfp_start { MSFP_START_PREDICTED, MSFP_START_PLAIN, MSFP_START_QUASISTATIC
 double msfp_stage_residual(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual);
 /* Subtract factor * step [MSFP_DOF] from the rates. */
 void msfp_stage_move(msfp_stage *s, const double *step, double factor);
+/* The same of rates [MSFP_NB][MSFP_NQ], of `width` numbers each. As Newton's method moves rates by its residual, so
+ * they follow what changes the residual, by the same factors: the implicit function theorem. */
+MSFP_INLINE void msfp_move_rates(double *rates, const double *step, double factor, int width)
+{
+    static const int unknown[MSFP_ND] = MSFP_FREE;
+    for (int k = 0; k < MSFP_NB; ++k)
+        for (int i = 0; i < MSFP_ND; ++i)
+            msfp_add(rates + (k * MSFP_NQ + unknown[i]) * width, step + (k * MSFP_ND + i) * width, -factor, width);
+}
+/* Columns [MSFP_ND][width] of the moments of a body, over N as Newton's method divides them. residual: what is left of
+ * them over N. */
+MSFP_INLINE void msfp_divide_columns(double normal, const double *residual, const double *dnormal, int width,
+                                     double *columns)
+{
+    const double inverse = 1.0 / normal;
+    for (int i = 0; i < MSFP_ND; ++i)
+        for (int c = 0; c < width; ++c)
+            columns[i * width + c] = inverse * (columns[i * width + c] - residual[i] * dnormal[c]);
+}
 /* Rates that balance all forces but inertia: a first guess where extrapolated rates fail. */
 void msfp_quasistatic_start(msfp_run *run, msfp_stage *s);
 /* Newton's method on a stage, from the rates in it. */
