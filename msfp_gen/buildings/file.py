@@ -26,7 +26,7 @@ from msfp_gen.scene.file.loader import (
     scene_parts,
 )
 from msfp_gen.scene.file.motion_tables import Paths, located, motion_from, paths_in, resolved
-from msfp_gen.scene.file.schema import EFFECTS, MOTION, PARTS, model_of, rows_of, validate
+from msfp_gen.scene.file.schema import EFFECTS, MOTION, PARTS, model_of, rows_of, validate, without
 from msfp_gen.scene.file.source import MOTION_PATHS
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import Kind
@@ -62,10 +62,19 @@ class NodeTable:
     position: Annotated[tuple[float, float, float], Quantity("m", shape=(3,))]
 
 
+@dataclass(frozen=True)
+class GridTable:
+    """The table `grid` of a row of `[[building.bearing]]`: a bearing at every crossing of the lines x and y [m]."""
+
+    x: Annotated[tuple[float, ...], Quantity("m", shape=(None,))]
+    y: Annotated[tuple[float, ...], Quantity("m", shape=(None,))]
+
+
 _INTERFACE, _SOIL, _BASE, _STOREY, _NODE = (model_of(kind) for kind in (NodeTop, Soil, BaseSlab, Storey, NodeTable))
 _BEARING = model_of(
     BuildingBearing,
     bearing=(Any, ...),
+    grid=(model_of(GridTable), None),
     interface=(_INTERFACE, None),
     soil=(_SOIL, None),
     effects=(EFFECTS, None),
@@ -105,13 +114,46 @@ def building_from_table(
     parts["building"] = _building(frame, folder)
     common = {name: frame[name] for name in COMMON if name in frame}
     bearings: dict[str, Bearing] = {}
-    rows = enumerate(frame["bearing"])
+    rows = enumerate(with_single_bearings(frame)["bearing"])
     parts["bearings"] = [
         _bearing({**common, **row}, f"building.bearing[{index}]", named, folder, bearings) for index, row in rows
     ]
     word = parts.pop("fidelity", "exact")
     scene: BuildingScene | Scene = at_fidelity(BuildingScene(**parts), word)
     return scene
+
+
+def with_single_bearings(frame: Table) -> Table:
+    """The table `[building]` with a row for each bearing of a grid, along x first; rows of no valid grid stay.
+
+    Bearings have the names of the grid, A1, B1, ..., A2, ..., after the `name` of its row. Raises InputError.
+    """
+    rows = frame.get("bearing")
+    if not isinstance(rows, list):
+        return frame
+    return {**frame, "bearing": [single for index, row in enumerate(rows) for single in _single(row, index)]}
+
+
+def _single(row: Any, index: int) -> Iterator[Any]:
+    """The rows of the bearings of a grid; a row without a valid grid itself."""
+    grid: Any = row.get("grid") if isinstance(row, dict) else None
+    is_grid = isinstance(grid, dict) and grid.keys() == {"x", "y"} and isinstance(row.get("name", ""), str)
+    if not is_grid or not all(isinstance(line, list | tuple) for line in grid.values()):
+        yield row
+        return
+    if not all(grid.values()):
+        raise InputError(f"building.bearing[{index}].grid = {grid!r}: give at least one line along each axis")
+    if "position" in row:
+        raise InputError(f"building.bearing[{index}].position: the grid has all places; leave out one of them")
+    common, name = {key: value for key, value in row.items() if key != "grid"}, row.get("name", "")
+    for j, y in enumerate(grid["y"], start=1):
+        yield from ({**common, "name": f"{name}{_letters(i)}{j}", "position": [x, y]} for i, x in enumerate(grid["x"]))
+
+
+def _letters(index: int) -> str:
+    """The name of a line by its index: A to Z, AA, AB, ..."""
+    before, last = divmod(index, 26)
+    return (_letters(before - 1) if before else "") + chr(ord("A") + last)
 
 
 def _building(table: Table, folder: Path | None) -> Building:
@@ -165,7 +207,7 @@ def _of_matrices(table: Table, options: Table) -> Building:
 def stored_bearing(row: Table, index: int) -> BuildingBearing:
     """A bearing from a complete table of a result file, in SI units. Raises InputError."""
     path = f"bearing[{index}]"
-    return _bearing(validate(_BEARING, row), path, {}, None, {})
+    return _bearing(validate(without(_BEARING, {"grid"}, row), row), path, {}, None, {})
 
 
 def _bearing(row: Table, path: str, named: Table, folder: Path | None, bearings: dict[str, Bearing]) -> BuildingBearing:
@@ -225,4 +267,12 @@ def _result() -> Any:
     return BuildingResult
 
 
-BUILDING = Kind("building", building_from_table, _with_files, COMMON, files(__package__) / "presets", _result)
+BUILDING = Kind(
+    "building",
+    building_from_table,
+    _with_files,
+    COMMON,
+    files(__package__) / "presets",
+    _result,
+    written_out=with_single_bearings,
+)

@@ -172,6 +172,7 @@ class Kind:
         common: tables inside the table `key` that its rows have unless they have their own.
         presets: folder of TOML files with systems of this kind; None: there are none.
         result: gives the class of their results, for files of results; None: there are no such files.
+        written_out: the table `key` with what it abbreviates written out, to which paths of fields refer.
     """
 
     key: str
@@ -180,6 +181,7 @@ class Kind:
     common: tuple[str, ...] = ()
     presets: Traversable | None = None
     result: Callable[[], Any] | None = None
+    written_out: Callable[[Table], Table] = lambda table: table
 
 
 def is_system(value: object) -> bool:

@@ -113,12 +113,18 @@ def _inner_places(walk: _Walk, inner: Any, keys: list[Key], common: Mapping[str,
         inner[step] = _own_bearing(walk, inner[step], rest[0]) if step == "bearing" else copy(inner[step])
         if isinstance(rest[0], str) and not isinstance(inner[step], dict):
             raise InputError(f"{step} is {inner[step]!r} here, which has no fields to change")
-        if inner is walk.root and isinstance(step, str) and step not in SCENE.model_fields and step in kinds():
-            common = {name: inner[step].get(name) for name in kinds()[step].common if isinstance(inner[step], dict)}
+        if inner is walk.root and isinstance(step, str) and isinstance(inner[step], dict) and _is_kind(step):
+            inner[step] = kinds()[step].written_out(inner[step])
+            common = {name: inner[step].get(name) for name in kinds()[step].common}
         if step == "bearing" and len(rest) == 1 and rest[0] in _COLUMNS and "layout" in inner[step]:
             yield from _column(walk, inner[step], str(rest[0]))
         else:
             yield from _inner_places(walk, inner[step], rest, common)
+
+
+def _is_kind(key: str) -> bool:
+    """Whether a table of a scene file tells its kind; the tables of one bearing are asked first, and load no kinds."""
+    return key not in SCENE.model_fields and key in kinds()
 
 
 def _column(walk: _Walk, bearing: Table, name: str) -> Iterator[_Place]:

@@ -24,10 +24,11 @@ from msfp_gen import (
     Soil,
     Storey,
     Top,
+    changed_scene,
     load_scene,
     presets,
 )
-from msfp_gen.buildings.file import building_from_table
+from msfp_gen.buildings.file import building_from_table, with_single_bearings
 from msfp_gen.scene.file.source import load_bearing_scene, with_absolute_paths
 
 TEXT = """
@@ -279,12 +280,61 @@ def test_examples_of_the_page(tmp_path: Path):
     exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), names)
     assert names["result"].axial_force.min() > 0 and names["scene"].axial_loads.sum() == pytest.approx(900e3 * 9.8)
     (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
-    others = "".join(f'[[building.bearing]]\nbearing = "corner"\nposition = {place}\n' for place in OTHERS)
-    scene = load_scene(written(tmp_path, text.replace("# ... further bearings", others)))
-    assert scene.axial_loads.sum() == pytest.approx(500e3 * 9.8)
+    scene = load_scene(written(tmp_path, text))
+    assert len(scene.bearings) == 4 and scene.axial_loads.sum() == pytest.approx(500e3 * 9.8)
 
 
-OTHERS = ([6, -4], [-6, 4], [6, 4])  # [m]
+GRID = """
+[[building.bearing]]
+bearing = "corner"
+grid = { x = [-3.0, "0 m", "3000 mm"], y = ["-2 m", 2.0] }
+"""
+HEAD, TAIL = TEXT[: TEXT.index("[[building.bearing]]")], TEXT[TEXT.index("[motion]") :]
+
+
+def test_a_grid_is_a_bearing_at_every_crossing(tmp_path: Path):
+    found = load_scene(written(tmp_path, HEAD + GRID + TAIL))
+    assert [(each.name, each.position) for each in found.bearings] == [
+        *zip(("A1", "B1", "C1"), ((-3, -2), (0, -2), (3, -2)), strict=True),
+        *zip(("A2", "B2", "C2"), ((-3, 2), (0, 2), (3, 2)), strict=True),
+    ]
+    assert len({each.bearing for each in found.bearings}) == 1
+    assert found.bearings[0].interface == Top.node(1e7, 5e7, 1e6)
+
+
+def test_lines_of_a_grid_go_on_after_z_and_names_begin_with_that_of_the_row(tmp_path: Path):
+    """Seventy bearings in one table."""
+    row = {"bearing": "fenz-tfp", "name": "N-", "grid": {"x": [7.5 * i for i in range(35)], "y": [-3.0, 3.0]}}
+    rows = with_single_bearings({"bearing": [row]})["bearing"]
+    assert len(rows) == 70
+    assert [rows[index]["name"] for index in (25, 26, 69)] == ["N-Z1", "N-AA1", "N-AI2"]
+    assert rows[69]["position"] == [255.0, 3.0] and "grid" not in rows[0]
+
+
+def test_paths_lead_to_single_bearings_of_a_grid(tmp_path: Path):
+    path = written(tmp_path, HEAD + GRID + TAIL)
+    changed = changed_scene(path, {"building.bearing[4].name": "mid", "building.bearing[*].interface.stiffness": 2e7})
+    assert [each.name for each in changed.bearings] == ["A1", "B1", "C1", "A2", "mid", "C2"]
+    assert {each.interface.stiffness for each in changed.bearings} == {2e7}
+    assert changed_scene("hospital-clc", {"building.bearing[5].name": "x"}).bearings[5].position == (-3.75, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ({"grid": {"x": [0.0]}}, r"building\.bearing\[0\]\.grid\.y is missing"),
+        ({"grid": {"x": [0.0], "y": []}}, r"building\.bearing\[0\]\.grid = .*: give at least one line along each axis"),
+        ({"grid": {"x": ["3 kg"], "y": [0.0]}}, r"building\.bearing\[0\]\.grid\.x = \['3 kg'\]: .* unit of \[m\]"),
+        ({"grid": {"x": [0.0], "y": [0.0]}, "position": [0, 0]}, r"bearing\[0\]\.position: the grid has all places"),
+        ({"grid": {"x": [0.0, 0.0], "y": [0.0]}}, r"scene.bearings\[1\]\.position = .*: scene.bearings\[0\] is there"),
+        ({"grid": 3}, r"building\.bearing\[0\]\.grid = 3: give a table"),
+    ],
+)
+def test_grids_that_are_none_are_named(row, message):
+    given = table()
+    given["building"]["bearing"] = [{"bearing": "fenz-tfp", **row}]
+    with pytest.raises(InputError, match=message):
+        building_from_table(given)
 
 
 def test_files_of_a_table_are_found_wherever_they_are_named(tmp_path: Path):
