@@ -268,20 +268,30 @@ class _State:
     def moment(self) -> Moment:
         """The estimate from all runs so far; missing runs are computed."""
         exact = self.outcomes(EXACT, self.exact)
-        cheap = None if self.cheap is None else self.controls(self.cheap, self.many)
+        cheap = None if self.cheap is None else self.controls(self.cheap, self.many, exact)
         population = self.source.population or np.inf
         if self.question.threshold is not None:
-            return mean_of((exact >= self.question.threshold).astype(float), cheap, population, largest=1.0)
+            return mean_of((exact >= self.question.threshold).astype(float), cheap, population, share=True)
         return mean_of(exact, cheap, population)
 
-    def controls(self, level: str, count: int) -> Array:
-        """What a cheap model gives at the first draws, shape (count, k): its exceedances, or all its quantities."""
+    def controls(self, level: str, count: int, exact: Array) -> Array:
+        """What a cheap model gives at the first draws, shape (count, k): its quantities, or whether they exceed.
+
+        exact: outcomes of the exact model. In a probability each quantity of the cheap model has the threshold beyond
+        which, or at an early end, as many of the same draws are as of the exact model.
+        """
         values, early = self.source.values(level, count)
         self.early[level] = int(early.sum())
         values = values.reshape(count, -1)
-        if self.question.threshold is not None:
-            return (values[:, :1] >= self.question.threshold).astype(float)
-        return np.stack([_finite(each) for each in values.T], axis=1)
+        if self.question.threshold is None:
+            return np.stack([_finite(each) for each in values.T], axis=1)
+        beyond = int((exact >= self.question.threshold).sum())
+        if self.question.side == "least":  # the least values are the worst, beside the largest displacement
+            beyond = len(exact) - beyond
+            values = np.column_stack([-values[:, :1], values[:, 1:]])
+        worst = np.where(early[:, None], np.inf, values)
+        limits = np.sort(worst[: len(exact)], axis=0)[-beyond] if beyond else np.nan
+        return (worst >= limits).astype(float)
 
     def work(self, moment: Moment, level: str) -> float:
         """Time by a cheap model for an interval, over the time of exact runs alone [-]."""
@@ -324,9 +334,6 @@ def estimated(source: Source, question: Question) -> Estimate:
             f"exact runs may not show; {PILOT} show what one in a hundred does"
         )
     value, half = moment.value, moment.half
-    interval = value - half, value + half
-    if question.threshold is not None:
-        value, *interval = np.clip([value, *interval], 0.0, 1.0).tolist()
     costs = {level: source.cost(level) for level in runs}
     if question.target is not None and half > 1.02 * question.target_half(value):
         notes.append(f"the target was not reached: the half width is {half:.3g}")
@@ -342,7 +349,7 @@ def estimated(source: Source, question: Question) -> Estimate:
     plain = max(value * (1 - value), 1e-12) if question.threshold is not None else moment.plain
     seconds = costs[EXACT] * plain * Z**2 / half**2 if half > 0 else spent
     return Estimate(
-        question.quantity or "", question.statistic, question.threshold, "", value, (interval[0], interval[1]), runs,
+        question.quantity or "", question.statistic, question.threshold, "", value, moment.interval, runs,
         spent, seconds, correlation, costs, trace=tuple(trace), notes=tuple(notes),
     )  # fmt: skip
 
@@ -356,7 +363,7 @@ def _choose(state: _State) -> dict[str, float]:
     for level in sorted(source.levels[1:], key=lambda name: LEVELS.get(name, 9)):
         if best < ENOUGH and question.models is None:
             break
-        moment = _moment_of_choice(exact, source.values(level, count)[0].reshape(count, -1), question.threshold)
+        moment = _moment_of_choice(state, level, exact)
         correlation[level] = moment.correlation
         if (needed := state.work(moment, level)) < best:
             best, state.cheap = needed, level
@@ -367,11 +374,13 @@ def _choose(state: _State) -> dict[str, float]:
     return correlation
 
 
-def _moment_of_choice(exact: Array, cheap: Array, threshold: float | None) -> Moment:
+def _moment_of_choice(state: _State, level: str, exact: Array) -> Moment:
     """The mean by the first draws; for a probability of the exceedances, where some runs exceed."""
-    if threshold is not None and 2 <= (exact >= threshold).sum() <= len(exact) - 2:
-        return mean_of((exact >= threshold).astype(float), (cheap[:, :1] >= threshold).astype(float), largest=0.0)
-    return mean_of(_finite(exact), np.stack([_finite(each) for each in cheap.T], axis=1), largest=0.0)
+    threshold, count = state.question.threshold, len(exact)
+    if threshold is not None and 2 <= (exact >= threshold).sum() <= count - 2:
+        return mean_of((exact >= threshold).astype(float), state.controls(level, count, exact), allowed=0.0)
+    values = state.source.values(level, count)[0].reshape(count, -1)
+    return mean_of(_finite(exact), np.stack([_finite(each) for each in values.T], axis=1), allowed=0.0)
 
 
 class _BudgetError(InputError):
@@ -391,7 +400,7 @@ def _plan_round(state: _State, moment: Moment, spent: float) -> bool:
         target_half = question.target_half(moment.value)
         if half <= target_half:
             return False
-        planned = moment.variance * (MARGIN * target_half / max(half, 1e-300)) ** 2
+        planned = (MARGIN * target_half / moment.quantile) ** 2
         runs = optimal_runs(variances, costs, variance=planned)
         if moment.unseen:  # such a variance falls with the square of the number of exact runs
             runs[0] = min(runs[0], exact * half / (MARGIN * target_half))

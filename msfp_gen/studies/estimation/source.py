@@ -44,7 +44,8 @@ class Source(Protocol):
         """The quantity at the first draws, shape (count,) [its unit], and which runs ended early, shape (count,).
 
         A cheap model may give further quantities beside it, then shape (count, k). Missing runs are computed.
-        The quantity of a run that ended early is the value until then; it is infinite where a run has no value.
+        The quantity of a run that ended early is the value until then; it is infinite where a run has no value, and an
+        exact run without one has ended early.
         """
 
     def cost(self, level: str) -> float:
@@ -107,8 +108,9 @@ class StudySource:
         folders = {level: folder if level == EXACT else folder / level for level in levels}
         self._models = {
             level: _Model(
-                level_study(study, level, quantity), own_folder, names_of(study, level, quantity), self.draws, pool
-            )
+                level_study(study, level, quantity), own_folder, names_of(study, level, quantity), self.draws, pool,
+                exact=level == EXACT,
+            )  # fmt: skip
             for level, own_folder in folders.items()
         }
         self._progress = progress
@@ -132,8 +134,12 @@ class StudySource:
 class _Model:
     """The runs of one model at the first `count` draws, kept as a study in a folder."""
 
-    def __init__(self, study: Study, folder: Path, names: Sequence[str], draws: Draws, pool: Pool) -> None:
-        self.study, self.folder, self.names, self.draws, self.pool = study, folder, names, draws, pool
+    def __init__(
+        self, study: Study, folder: Path, names: Sequence[str], draws: Draws, pool: Pool, *, exact: bool
+    ) -> None:
+        self.study, self.folder, self.names, self.draws, self.pool, self.exact = (
+            study, folder, names, draws, pool, exact,
+        )  # fmt: skip
         self.count = 0
         if (folder / STUDY_FILE).is_file():
             self.count = int(study_table(folder).get("accuracy", {}).get("draws", 0))
@@ -154,7 +160,7 @@ class _Model:
         if len(values) < self.count:
             raise RunError(f"{self.folder}: {self.count - len(values)} runs are missing; run the same command again")
         self._values = np.where(np.isnan(values), np.inf, values)
-        self._early = ~complete | np.isnan(values.reshape(len(values), -1)[:, 0])
+        self._early = ~complete | (self.exact & np.isnan(values.reshape(len(values), -1)[:, 0]))
 
     def _listed_study(self) -> Study:
         """The study whose rows are the runs."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from scipy.stats import norm, t
+from scipy.stats import binom, norm, t
 
 from msfp_gen import InputError
 from msfp_gen.studies import estimate, read_study
@@ -77,11 +77,11 @@ def test_the_estimate_is_the_regression_line_at_the_mean_of_the_cheap_model():
     cheap = rng.standard_normal(500)
     exact = 2.0 + 0.7 * cheap[:40] + 0.1 * rng.standard_normal(40)
     slope, intercept = np.polyfit(cheap[:40], exact, 1)
-    found = mean_of(exact, cheap[:, None], largest=0.0)
+    found = mean_of(exact, cheap[:, None], allowed=0.0)
     assert found.value == pytest.approx(intercept + slope * cheap.mean())
     assert found.residual == pytest.approx(np.sum((exact - intercept - slope * cheap[:40]) ** 2) / 38)
     assert found.explained == pytest.approx(slope**2 * cheap.var(ddof=1)) and found.freedom == 38
-    alone = mean_of(exact, largest=0.0)
+    alone = mean_of(exact, allowed=0.0)
     assert alone.value == exact.mean() and alone.variance == pytest.approx(exact.var(ddof=1) / 40)
     assert alone.half == pytest.approx(np.diff(t.interval(0.95, 39, scale=exact.std(ddof=1) / np.sqrt(40)))[0] / 2)
 
@@ -111,8 +111,33 @@ def test_the_variance_is_that_of_repetitions():
 
 
 def test_an_event_that_no_run_shows_may_still_occur():
-    """The rule of three: of 100 runs without an event the interval reaches to about 3/100."""
-    assert mean_of(np.zeros(100), largest=1.0).half == pytest.approx(0.028, abs=0.001)
+    """By Wilson (1927) the interval of no event in 100 runs reaches to q^2/(n + q^2)."""
+    assert mean_of(np.zeros(100), share=True).interval == pytest.approx((0.0, 1.984**2 / (100 + 1.984**2)), abs=1e-5)
+
+
+@pytest.mark.parametrize("chance", [0.02, 0.1, 0.5, 0.97])
+def test_intervals_of_a_share_miss_on_both_sides_alike(chance):
+    """Of all samples of 500 with their weights."""
+    counts = np.arange(501)
+    weights = binom.pmf(counts, 500, chance)
+    ends = np.array([
+        mean_of((np.arange(500) < count).astype(float), share=True).interval for count in counts[weights > 1e-9]
+    ])  # fmt: skip
+    below, above = ends[:, 1] < chance, ends[:, 0] > chance
+    missed = [float(weights[weights > 1e-9] @ side) for side in (below, above)]
+    assert 0.92 < 1 - sum(missed) < 0.98 and all(0.005 < each < 0.045 for each in missed)
+
+
+def test_a_share_with_a_control_has_the_interval_of_more_draws():
+    """As many as have its variance; of a control that says nothing, those of the exact runs, less the allowance."""
+    rng = np.random.default_rng(2)
+    hidden = rng.random(60_000)
+    exact, cheap = (hidden < 0.1).astype(float), (hidden < 0.09).astype(float)
+    alone, helped = mean_of(exact[:2000], share=True), mean_of(exact[:2000], cheap[:, None], share=True)
+    assert alone.draws == pytest.approx(2000)
+    assert helped.draws == pytest.approx(helped.plain / helped.variance) and helped.draws > 4 * alone.draws
+    useless = mean_of(exact[:2000], rng.permutation(cheap)[:, None], share=True)
+    assert 0.97 * 2000 < useless.draws < 2000 and useless.half == pytest.approx(alone.half, rel=0.02)
 
 
 def smooth(rng, count):
@@ -255,6 +280,32 @@ def test_runs_that_end_early_count_as_above():
     ]
     assert sum(found.interval[0] <= 0.1 <= found.interval[1] for found in every) >= 17
     assert all("ended early" in " ".join(found.notes) for found in every if found.value > 0)
+
+
+class Separating(Lognormal):
+    """Both models end early at the same draws; the cheap one has a bias, and no such quantity, but a displacement."""
+
+    def __init__(self, seed=0):
+        super().__init__(seed, fails=0.1)
+        cheap = 3.0 * self._values["exact"] ** 0.8
+        self._values["equivalent"] = np.stack([np.full(len(cheap), np.inf), cheap], axis=1)
+
+    def values(self, level, count):
+        return super().values(level, count)[0], self._early[:count]
+
+
+@pytest.mark.parametrize(("side", "threshold"), [("most", 2.0), ("least", 0.5)])
+def test_a_cheap_model_exceeds_as_often_as_the_exact_one(side, threshold):
+    """A biased displacement that rises with the quantity, or falls, tells all exceedances, and so do early ends."""
+    source = Separating()
+    if side == "least":
+        source._values["exact"] = 1 / source._values["exact"]
+        source._values["equivalent"][:, 0] = np.inf
+    found = estimated(source, Question("q", "probability", threshold, target=0.01, side=side))
+    beyond = np.mean((source._values["exact"] >= threshold) | source._early)
+    expected = beyond if side == "most" else np.mean((source._values["exact"] >= threshold) & ~source._early)
+    assert found.interval[0] <= expected <= found.interval[1]
+    assert found.correlation["equivalent"] == pytest.approx(1.0) and found.plain_seconds > 3 * found.seconds
 
 
 def test_runs_that_end_early_count_as_below_where_the_least_is_the_worst():
