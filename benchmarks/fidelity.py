@@ -30,7 +30,7 @@ from test_estimate import LIMIT, POPULATIONS, Population
 REPETITIONS = pick(400, 2)
 COUNTS = {"design": pick(200, 34), "beyond": pick(60, 34)}
 MEDIANS = {"design": 0.7, "beyond": 1.3}  # of the scale of motions
-LEVELS = {"design": ("exact", "equivalent"), "beyond": ("exact", "massless")}
+LEVELS = {"design": ("exact", "equivalent"), "beyond": ("exact", "equivalent", "massless")}
 DURATION = pick(None, 8.0)
 
 
@@ -94,8 +94,9 @@ class Table:
         """As of `Source`."""
         self._done[level] = max(count, self._done[level])
         rows = self._rows[level][self._place[:count]]
-        columns = [self._column] if level == "exact" or self._column != 1 else [1, 0]  # as of `names_of`
-        return np.squeeze(rows[:, columns], axis=1) if len(columns) == 1 else rows[:, columns], rows[:, 4] == 0
+        columns = [self._column] if level == "exact" or not self._column else [self._column, 0]  # as of `names_of`
+        values = np.where(np.isnan(rows[:, columns]), np.inf, rows[:, columns])
+        return values[:, 0] if len(columns) == 1 else values, rows[:, 4] == 0
 
     def cost(self, level: str) -> float:
         """As of `Source`."""
@@ -139,9 +140,9 @@ def line_of(case: Case, rows: dict[str, np.ndarray]) -> str:
     held = np.mean([one.interval[0] <= truth <= one.interval[1] for one in found])
     gain = np.median([one.plain_seconds / one.seconds for one in found])
     exact = int(np.median([one.runs["exact"] for one in found]))
-    ((level, rho),) = {
-        name: np.median([one.correlation[name] for one in found]) for name in found[0].correlation
-    }.items()
+    runs = {level: np.median([one.runs.get(level, 0) for one in found]) for level in rows if level != "exact"}
+    level = max(runs, key=lambda name: runs[name])
+    rho = np.median([one.correlation[level] for one in found])
     return (
         f"| {case.about} | {level} | {case.question.target:g} | {rho:.3f} | {exact} | {gain:.1f} | {100 * held:.1f} % |"
     )

@@ -15,6 +15,7 @@ from msfp_gen.scene.fidelity import (
     constant_friction,
     equivalent_pendulum,
     implicit_solver,
+    lively_end,
     peak_speed,
     without_inertia,
 )
@@ -74,5 +75,6 @@ def _equivalent(scene: BuildingScene) -> Scene:
     )  # no other is of all bearings
     return Scene(
         bearing=bearing, motion=scene.first_ground, top=top, effects=effects, solver=implicit_solver(scene.solver),
-        duration=scene.end, output_step=scene.output_step, name=scene.name, limits=limits, fidelity="equivalent",
+        duration=lively_end(scene.first_ground, scene.end), output_step=scene.output_step, name=scene.name, limits=limits,
+        fidelity="equivalent",
     )  # fmt: skip

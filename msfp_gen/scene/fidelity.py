@@ -160,6 +160,7 @@ EQUAL = 1e-9  # relative difference of slopes that are equal but for rounding
 LOOSE = 1e-2  # relative tolerance of the cheaper models
 JOINT = 0.05  # radius of the joint of the equivalent pendulum, and height of its slider [m]
 JOINT_FRICTION = 1e-3
+LIVELY = 0.99  # share of the motion of the base after which a run of the equivalent pendulum ends
 LEVEL = 100.0  # rotational stiffness of the plate of the equivalent pendulum, over what it needs to stand
 
 # Level -> what a run at it cannot see, for its note.
@@ -170,7 +171,7 @@ UNSEEN = {
     "equivalent": "fidelity = 'equivalent': one pendulum with the longest sliding regime of the published backbone; it "
     "does not see the other regimes, the single surfaces and their rims, heat, uplift and the tilt of the top plate; "
     "its friction is constant, by a friction law at the load at rest, the largest velocity of the base and the start "
-    "temperature",
+    "temperature; it ends when 99 % of the motion of the base have passed",
     "rigid": "fidelity = 'rigid': the building is one rigid body; it does not see drifts and floor accelerations",
 }
 
@@ -245,6 +246,7 @@ def _equivalent(scene: Scene) -> Scene:
     return replace(
         scene,
         bearing=bearing,
+        duration=lively_end(scene.motion, scene.end) if scene.load is None else scene.end,
         top=_level(scene, bearing),
         effects=effects,
         top_rotation=None,
@@ -261,6 +263,15 @@ def _level(scene: Scene, bearing: Bearing) -> Top:
         load, lever = top.mass * bearing.gravity, lever + top.height
     held: Top = replace(top, rotational_stiffness=max(top.rotational_stiffness, LEVEL * load * lever))
     return held
+
+
+def lively_end(motion: Motion, end: float) -> float:
+    """Time by which `LIVELY` of the squared velocity and of the squared acceleration of the base have passed [s]."""
+    times = np.union1d(motion.knots[motion.knots < end], np.linspace(0.0, end, 1001))
+    passed = [
+        np.cumsum(np.sum(motion.evaluate(times[1:], order)[:, :3] ** 2, axis=1) * np.diff(times)) for order in (1, 2)
+    ]
+    return float(times[1:][max(np.searchsorted(each, LIVELY * each[-1]) if each[-1] else -1 for each in passed)])
 
 
 def peak_speed(motion: Motion, end: float) -> float:

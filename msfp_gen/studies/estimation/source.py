@@ -108,9 +108,13 @@ class StudySource:
         folders = {level: folder if level == EXACT else folder / level for level in levels}
         self._models = {
             level: _Model(
-                level_study(study, level, quantity), own_folder, names_of(study, level, quantity), self.draws, pool,
+                level_study(study, level, quantity),
+                own_folder,
+                names_of(study, level, quantity),
+                self.draws,
+                pool,
                 exact=level == EXACT,
-            )  # fmt: skip
+            )
             for level, own_folder in folders.items()
         }
         self._progress = progress

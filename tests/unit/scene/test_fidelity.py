@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from msfp_gen import Auto, InitialState, InputError, Limits, Motion, changed_scene, load_scene, simulate
+from msfp_gen import Auto, InitialState, InputError, Limits, Load, Motion, changed_scene, load_scene, simulate
 from msfp_gen.results.result import load_result
 from msfp_gen.scene.fidelity import (
     LOOSE,
@@ -13,6 +13,7 @@ from msfp_gen.scene.fidelity import (
     at_fidelity,
     constant_friction,
     equivalent_pendulum,
+    lively_end,
     main_regime,
     peak_speed,
 )
@@ -78,6 +79,21 @@ def test_a_reduced_scene_is_written_and_read_as_it_is(tmp_path):
     path = run.to_netcdf(tmp_path / "run.nc")
     again = load_result(path)
     assert again.scene.bearing == run.scene.bearing and again.notes == run.notes
+
+
+def test_the_equivalent_pendulum_ends_when_the_record_is_over():
+    """Its peaks are those of the whole record; a base that moves evenly, or a load, keeps the end."""
+    given = load_scene("ridgecrest-clc")
+    one = at_fidelity(given, "equivalent")
+    assert 0.4 * given.end < one.end < 0.6 * given.end
+    short, whole = simulate(one).summary, simulate(replace(one, duration=given.end)).summary
+    assert short["peak_displacement"] == whole["peak_displacement"] and short["peak_force"] == whole["peak_force"]
+    times = np.linspace(0.0, 5.0, 51)
+    even = Motion.from_velocity(times, np.outer(np.minimum(times, 0.1), [1.0, 0.0, 0.0]))
+    assert lively_end(even, 5.0) == pytest.approx(4.95, abs=0.01)
+    assert lively_end(Motion.from_velocity(times, np.zeros((51, 3))), 5.0) == 5.0
+    loaded = replace(load_scene("fenz-test2"), load=Load.harmonic((0.0, 0.0, 1e3), frequency=0.1, cycles=5.0))
+    assert at_fidelity(loaded, "equivalent").end == loaded.end
 
 
 def test_an_initial_state_has_no_equivalent():
