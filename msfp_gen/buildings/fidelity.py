@@ -75,6 +75,6 @@ def _equivalent(scene: BuildingScene) -> Scene:
     )  # no other is of all bearings
     return Scene(
         bearing=bearing, motion=scene.first_ground, top=top, effects=effects, solver=implicit_solver(scene.solver),
-        duration=lively_end(scene.first_ground, scene.end), output_step=scene.output_step, name=scene.name, limits=limits,
-        fidelity="equivalent",
+        duration=lively_end(scene.first_ground, scene.end), output_step=scene.output_step, name=scene.name,
+        limits=limits, fidelity="equivalent",
     )  # fmt: skip
