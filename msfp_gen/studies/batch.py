@@ -14,8 +14,7 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import System, is_system
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.simulate import integrate
-from msfp_gen.studies.process import proceed
-from msfp_gen.studies.workers import SharedProgress, local_pool, worker_count
+from msfp_gen.studies.workers import SharedProgress, local_pool, proceed, worker_count
 
 Proceed = Callable[[float, float], None]  # (simulated time, end), or (share done, 1)
 ENDED = ("ok", "stopped")  # statuses of runs that did not fail

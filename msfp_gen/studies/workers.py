@@ -1,19 +1,24 @@
 """Pools of workers: calls come in, their values go out as they end (docs/batch.md).
 
 A pool is an executor in the sense of `concurrent.futures`: the workers of this machine, an executor of the caller, or
-Dask. A worker of this machine is a thread, and has a process of its own where measurement shows that this is faster.
+Dask. A worker of this machine is a thread; calls go on to processes of loky where measurement shows that this is
+faster. These are new interpreters that do not import the script of the user, so that a script needs no
+`if __name__ == "__main__"`, and no fork copies locks of other threads.
 """
 
 from __future__ import annotations
 
 import atexit
+import io
 import os
+import pickle
+import signal
 import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from queue import SimpleQueue
@@ -21,7 +26,6 @@ from typing import Any, TypeVar
 
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.errors import InputError, MsfpError, RunError
-from msfp_gen.studies.process import EndedError, Process, Report, StoppedError, UnsuitedError, reporting, worker
 
 T = TypeVar("T")
 S = TypeVar("S")
@@ -29,7 +33,31 @@ AHEAD = 2  # calls in flight for each worker, so that no worker is idle
 CONNECT = "20s"  # time in which a Dask scheduler must answer
 UNKNOWN = 64  # workers that are assumed of an executor that does not state their number
 START = 1.0  # time that calls in threads wait [s], for all workers together, after which processes are tried
+UNPICKLED = (pickle.PicklingError, AttributeError, TypeError)  # what pickle raises
+IDLE = 300.0  # time without a call after which processes end [s]; the next call starts others
 TRIED = 2, 0.1  # calls of each worker, and their processor time [s], by which threads and then processes are measured
+
+
+Report = Callable[[float, float], None]  # (reached, end)
+_worker = threading.local()  # attributes `stop`: the flag that ends the runs of this thread; `report`: of its call
+
+
+class _StoppedError(Exception):
+    """Ends a run in a worker after the block of its pool has ended."""
+
+
+class _UnsuitedError(Exception):
+    """What a call takes or returns cannot travel to another process."""
+
+
+def proceed(reached: float, end: float) -> None:
+    """The `progress` callback of a run in a worker: reports, and ends the run once its pool has ended."""
+    stop: threading.Event | None = getattr(_worker, "stop", None)
+    if stop is not None and stop.is_set():
+        raise _StoppedError
+    report: Report | None = getattr(_worker, "report", None)
+    if report is not None:
+        report(reached, end)
 
 
 @dataclass(frozen=True)
@@ -199,7 +227,7 @@ def end_idle() -> None:
 
 
 class Workers(Executor):
-    """Threads that run calls, or let them run in their processes.
+    """Threads that run calls, or let processes run them.
 
     Calls run in threads until they have waited for each other so long that the start of processes would have cost no
     more. Then some calls run in processes, and the way in which calls waited less is kept. So no user has to know the
@@ -209,9 +237,9 @@ class Workers(Executor):
     def __init__(self, count: int) -> None:
         self._count = count
         self._threads = ThreadPoolExecutor(count, "msfp-gen", self._begin_thread)
-        self._processes: list[Process] = []
+        self._processes: Any = None  # executor of loky
+        self._known: set[int] = set()  # processes that have ended a call: their start and first imports are over
         self._lock = threading.Lock()
-        self._own = threading.local()  # attribute `process`: that of this thread
         self._stop = threading.Event()
         self._waited = 0.0
         self._suited = count > 1
@@ -220,33 +248,35 @@ class Workers(Executor):
     def submit(  # type: ignore[override]
         self, function: Callable[..., T], /, *arguments: Any, report: Report | None = None
     ) -> Future[T]:
-        """As of `Executor`. report: called with the progress of the call."""
+        """As of `Executor`. report: called with the progress of the call; from a process only when it has ended."""
         return self._threads.submit(self._call, function, arguments, report)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """As of `Executor`; calls that run are ended."""
         self._stop.set()
         with self._lock:
-            processes, self._processes = self._processes, []
-        for process in processes:
-            process.hang_up()
-        for process in processes:
-            process.end()
+            if self._processes is not None:
+                self._processes.shutdown(kill_workers=True)
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
 
     def _begin_thread(self) -> None:
-        worker.stop = self._stop
+        _worker.stop = self._stop
 
     def _call(self, function: Callable[..., T], arguments: tuple[Any, ...], report: Report | None) -> T:
-        """The value of a call, in this thread or in its process."""
+        """The value of a call, in this thread or in a process."""
         ways = self.ways
         if self.in_process(ways):
-            with suppress(UnsuitedError):
-                return self._call_process(ways.processes, function, arguments, report)
-            self._suited = False
+            try:
+                found: T = self._call_process(ways.processes, function, arguments)
+            except _UnsuitedError:
+                self._suited = False
+            else:
+                if report is not None:
+                    report(1.0, 1.0)
+                return found
         begin, worked = time.perf_counter(), time.thread_time()
-        with reporting(report):
-            value = function(*arguments)
+        _worker.report = report
+        value = function(*arguments)
         worked, taken = time.thread_time() - worked, time.perf_counter() - begin
         with self._lock:
             ways.threads.add(taken, worked)
@@ -260,38 +290,86 @@ class Workers(Executor):
         threads, processes = (way.tried(self._count) for way in (ways.threads, ways.processes))
         return ways.processes.slowness < ways.threads.slowness if threads and processes else threads
 
-    def _call_process(
-        self, way: Way, function: Callable[..., T], arguments: tuple[Any, ...], report: Report | None
-    ) -> T:
-        """The value of a call in the process of this thread. Raises UnsuitedError."""
-        process: Process | None = getattr(self._own, "process", None)
-        new = process is None or process.ended
-        if process is None or new:
-            process = self._own.process = self._new_process(process)
+    def _call_process(self, way: Way, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        """The value of a call in a process. Raises _UnsuitedError."""
+        import cloudpickle
+        import loky
+
+        try:
+            call = cloudpickle.dumps((function, arguments))
+        except UNPICKLED as error:
+            raise _UnsuitedError from error
+        with self._lock:
+            if self._stop.is_set():
+                raise _StoppedError
+            if self._processes is None:
+                begin_process = (_begin_process, (os.getpid(),))
+                self._processes = loky.ProcessPoolExecutor(self._count, None, None, IDLE, None, *begin_process)
         begin = time.perf_counter()
         try:
-            value, worked = process.call(function, arguments, report)
-        except EndedError as error:
+            value, worked, process = self._processes.submit(_answer, call).result()
+        except (BrokenExecutor, RuntimeError) as error:
             if self._stop.is_set():
-                raise StoppedError from error
-            raise BrokenExecutor(str(error)) from error
-        if not new:  # its start and its first imports are over
+                raise _StoppedError from error
+            raise
+        if process in self._known:
             with self._lock:
                 way.add(time.perf_counter() - begin, worked)
-        found: T = value
-        return found
+        self._known.add(process)
+        return _Unpickler(io.BytesIO(value), arguments).load()
 
-    def _new_process(self, before: Process | None) -> Process:
-        """A process for this thread. before: the one that has ended."""
-        process = Process()
-        with self._lock:
-            self._processes.append(process)
-        if before is not None:
-            before.end()
-        if self._stop.is_set():
-            process.end()
-            raise StoppedError
-        return process
+
+def _begin_process(parent: int) -> None:
+    """Leave Ctrl-C, which a terminal sends to all processes, to the parent, and end when it has died."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    if os.name == "posix":
+        threading.Thread(target=watch, daemon=True).start()
+
+
+def _answer(call: bytes) -> tuple[bytes, float, int]:
+    """In a process: the value of a call as bytes, its processor time [s], the process. Raises _UnsuitedError."""
+    try:
+        function, arguments = pickle.loads(call)
+    except Exception as error:  # such as of a class that cannot be imported here
+        raise _UnsuitedError(repr(error)) from None
+    begin = time.thread_time()
+    value = function(*arguments)
+    worked, stream = time.thread_time() - begin, io.BytesIO()
+    try:
+        _Pickler(stream, arguments).dump(value)
+    except UNPICKLED as error:
+        raise _UnsuitedError(repr(error)) from None
+    return stream.getvalue(), worked, os.getpid()
+
+
+class _Pickler(pickle.Pickler):
+    """Of what is among `known`, the number travels: a result comes back with the scene of the caller."""
+
+    def __init__(self, stream: io.BytesIO, known: tuple[Any, ...]) -> None:
+        super().__init__(stream, protocol=5)
+        self._numbers = {id(each): number for number, each in enumerate(known)}
+
+    def persistent_id(self, each: Any) -> int | None:
+        """The number of a known object."""
+        return self._numbers.get(id(each))
+
+
+class _Unpickler(pickle.Unpickler):
+    """As `_Pickler` wrote."""
+
+    def __init__(self, stream: io.BytesIO, known: tuple[Any, ...]) -> None:
+        super().__init__(stream)
+        self._objects = known
+
+    def persistent_load(self, number: Any) -> Any:
+        """The known object of a number."""
+        return self._objects[number]
 
 
 class SharedProgress:

@@ -23,8 +23,7 @@ from msfp_gen.simulation.gradients import UNDAMPED, undamped_surfaces
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.calibration.intervals import SINGULAR
 from msfp_gen.studies.calibration.measurement import Measurement
-from msfp_gen.studies.process import proceed
-from msfp_gen.studies.workers import SharedProgress, Ways, local_pool
+from msfp_gen.studies.workers import SharedProgress, Ways, local_pool, proceed
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
