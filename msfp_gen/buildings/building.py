@@ -22,6 +22,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, MsfpError
 from msfp_gen.common.fields import LARGEST, require_type
 from msfp_gen.common.inputs import read_input
+from msfp_gen.common.tables import Printed, Rows
 
 Indices = NDArray[np.intp]
 _FORMS = {"coordinate": 3, "array": 2}  # form of a Matrix Market file -> numbers in the line of sizes
@@ -80,8 +81,8 @@ def _indices_of_array(shape: tuple[int, int], symmetry: str) -> tuple[Indices, I
 _HIGHEST = 1e6  # largest frequency that is accepted [Hz]
 
 
-@dataclass(frozen=True, eq=False)
-class Building:
+@dataclass(frozen=True, eq=False, repr=False)
+class Building(Printed):
     """A linear superstructure that is held by its bearings alone: M, C, K and nodes.
 
     The coordinates are displacements relative to the position at rest, in axes that do not move; rotations are small.
@@ -96,6 +97,18 @@ class Building:
     stiffness: Array
     nodes: tuple[Node, ...]
     columns: tuple[Columns, ...] = ()
+
+    def printed_rows(self) -> tuple[str, Rows]:
+        """Sizes and frequencies in four rows."""
+        listed = ", ".join(f"{frequency:.4g}" for frequency in self.frequencies[:6])
+        more = f", ... of {len(self.frequencies)}" if len(self.frequencies) > 6 else ""
+        rows = [
+            ("mass", f"{self.uniform_acceleration((0, 0, 1)) @ self.rigid_motions[:, 2]:.6g} kg"),
+            ("nodes", ", ".join(node.name for node in self.nodes)),
+            ("coordinates", str(len(self.mass))),
+            ("frequencies", f"{listed}{more} Hz on a fixed base" if listed else "none: a rigid body"),
+        ]
+        return "Building", rows
 
     @classmethod
     def shear(

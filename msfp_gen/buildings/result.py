@@ -18,11 +18,11 @@ from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.spectra import FloorSpectra, Steps, floor_spectra, kept_spectra
 from msfp_gen.buildings.summary import BuildingCharacterisation
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.tables import Table
+from msfp_gen.common.tables import Rows, Table
 from msfp_gen.results.files import Storage
 from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Extremes, by_axis
 from msfp_gen.results.note import Note
-from msfp_gen.results.result import AnyResult, Curve, Mounting, Result, Rows
+from msfp_gen.results.result import AnyResult, Curve, Mounting, Result
 from msfp_gen.results.summary import ratios_text, time_row
 from msfp_gen.scene.fidelity import Backbone
 

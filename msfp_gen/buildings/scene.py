@@ -18,7 +18,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
 from msfp_gen.common.identity import NO_NUMBERS
-from msfp_gen.common.tables import Table
+from msfp_gen.common.tables import Printed, Rows, Table
 from msfp_gen.motions.motion import Motion
 from msfp_gen.results.quantities import Source
 from msfp_gen.results.variables import Places
@@ -114,8 +114,8 @@ class VerticalModes(NamedTuple):
     shares: Array
 
 
-@dataclass(frozen=True, eq=False)
-class BuildingScene(OtherSystem):
+@dataclass(frozen=True, eq=False, repr=False)
+class BuildingScene(Printed, OtherSystem):
     """The complete input of the run of a building.
 
     building: the superstructure. bearings: at least one, of any layouts. motion: of the ground, from rest, in
@@ -350,8 +350,8 @@ class BuildingScene(OtherSystem):
 
         return quantities(self)
 
-    def __repr__(self) -> str:
-        """The parts in a few lines."""
+    def printed_rows(self) -> tuple[str, Rows]:
+        """The parts in a few rows."""
         layouts = ", ".join(dict.fromkeys(bearing.layout.name for bearing in self.every_bearing))
         parts = {
             "building": f"{len(self.building.mass)} coordinates, {len(self.building.nodes)} nodes, "
@@ -360,7 +360,7 @@ class BuildingScene(OtherSystem):
             "motion": f"{self.motion.name or 'unnamed'}, {self.motion.duration:g} s",
             "solver": f"{self.solver.method}, rtol {self.solver.rtol:g}, until {self.end:.6g} s",
         }
-        return "\n".join([f"BuildingScene {self.name}", *(f"  {name:<9}{text}" for name, text in parts.items())])
+        return f"BuildingScene {self.name or 'without a name'}", list(parts.items())
 
     def refusals(self) -> list[str]:
         """Why values can hardly be meant, as of `scene.plausibility.refusals`."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from io import BytesIO, StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +17,32 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 TABLE_SUFFIXES = (".csv", ".parquet")
+Rows = list[tuple[str, str]]  # label and value
+
+
+class Printed(ABC):
+    """What `print` and a notebook show of an object that has a title and a few rows."""
+
+    @abstractmethod
+    def printed_rows(self) -> tuple[str, Rows]:
+        """Title, and label and value of each row."""
+
+    def __repr__(self) -> str:
+        """Title and rows as text, one line each."""
+        title, rows = self.printed_rows()
+        width = max(8, *(len(label) for label, _ in rows)) + 1
+        return "\n".join([title, *(f"  {label:<{width}}{' '.join(value.split())}" for label, value in rows)])
+
+    def _repr_html_(self) -> str:
+        """Title, rows and what stands beside them, for a notebook."""
+        title, rows = self.printed_rows()
+        cells = "".join(f"<tr><th>{escape(label)}</th><td>{escape(value)}</td></tr>" for label, value in rows)
+        below = f"<div style='display:flex;gap:1em'><table>{cells}</table>{self.printed_beside()}</div>"
+        return f"<div><b>{escape(title)}</b>{below}</div>"
+
+    def printed_beside(self) -> str:
+        """HTML beside the rows in a notebook."""
+        return ""
 
 
 @dataclass(frozen=True)

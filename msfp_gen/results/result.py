@@ -5,7 +5,7 @@ What can be done with any result is a function of `files.py`, `summary.py` and t
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -19,7 +19,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.later import Later
-from msfp_gen.common.tables import Table
+from msfp_gen.common.tables import Printed, Rows, Table
 from msfp_gen.results import dataset, files
 from msfp_gen.results.characterise import Characterisation
 from msfp_gen.results.characterise import characterise as characterise_bearing
@@ -48,7 +48,6 @@ if TYPE_CHECKING:
 MAX_NOTES = 3  # printed, unless more are decisive; the others are counted
 MAX_POINTS = 600  # of the curve
 WIDTH, HEIGHT, MARGIN = 320, 200, 8  # of the curve [px]
-Rows = list[tuple[str, str]]  # label and value
 
 
 class Curve(NamedTuple):
@@ -59,7 +58,7 @@ class Curve(NamedTuple):
     caption: str
 
 
-class AnyResult(ABC):
+class AnyResult(Printed):
     """What results of one bearing and of a building offer: dataset, files, summary, verdict, tables, printed text.
 
     source: the attribute of a file by which its kind of result is known. storage: what makes its dataset, and reads its
@@ -189,12 +188,12 @@ class AnyResult(ABC):
         """Label and value of the main results after the status and the verdict."""
         return [("status", self.status_text), ("verdict", self.verdict.text), *self.main_results()]
 
-    def printed_rows(self) -> Rows:
-        """`stated_rows` with the first notes."""
+    def printed_rows(self) -> tuple[str, Rows]:
+        """Name, and `stated_rows` with the first notes, in nine rows at most."""
         lines, others = self.first_notes
         more = f"; {others} more in .notes" if others else ""
         shown = [("notes", "; ".join(lines) + more)] if lines else []
-        return [*self.stated_rows, *shown]
+        return f"Result of {self.title}", [*self.stated_rows, *shown]
 
     @property
     def first_notes(self) -> tuple[list[str], int]:
@@ -204,22 +203,10 @@ class AnyResult(ABC):
         shown = max(decisive, MAX_NOTES)
         return [note.line for note in notes[:shown]], max(0, len(notes) - shown)
 
-    def __repr__(self) -> str:
-        """The main results in ten lines at most."""
-        rows = [f"  {label:<18}{_one_line(value)}" for label, value in self.printed_rows()]
-        return "\n".join([f"Result of {self.title}", *rows])
-
-    def _repr_html_(self) -> str:
-        """The main results as a table beside a curve, for a notebook."""
-        cells = "".join(
-            f"<tr><th>{escape(label)}</th><td>{escape(_one_line(value))}</td></tr>"
-            for label, value in self.printed_rows()
-        )
+    def printed_beside(self) -> str:
+        """The curve, for a notebook."""
         x, y, caption = self.curve
-        return (
-            f"<div><b>{escape(self.title)}</b><div style='display:flex;gap:1em'><table>{cells}</table>"
-            f"<figure style='margin:0'>{_svg(x, y)}<figcaption>{escape(caption)}</figcaption></figure></div></div>"
-        )
+        return f"<figure style='margin:0'>{_svg(x, y)}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
 @dataclass(frozen=True)
@@ -467,10 +454,6 @@ def _scaled(values: Array, size: float) -> Array:
     low, spread = float(values.min()), float(np.ptp(values)) or 1.0
     scaled: Array = MARGIN + (values - low) / spread * (size - 2 * MARGIN)
     return scaled
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
 
 
 def characterise(result: Any) -> Any:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, paired, require_type
+from msfp_gen.common.tables import Printed, Rows
 from msfp_gen.scene.sheet import BOUNDS, Sheet
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import Layout
@@ -110,8 +111,8 @@ _SURFACE_ARRAYS = tuple(  # the stiffness of unilateral contacts depends on the 
 )
 
 
-@dataclass(frozen=True)
-class Bearing:
+@dataclass(frozen=True, repr=False)
+class Bearing(Printed):
     """A stack of bodies with `layout`: n - 1 surfaces, and the bodies 2..n above the base (body 1), bottom first.
 
     base_height: l_1 [m]. gravity: g, by default of PEER 2017/07; the unit g of texts is 9.80665 [m/s^2].
@@ -214,14 +215,14 @@ class Bearing:
             raise InputError(f"{path} has {len(items)} entries: layout {self.layout.name} needs {count}, {meaning}")
         object.__setattr__(self, name, items)
 
-    def __repr__(self) -> str:
-        """Layout, and the values of every surface and body, bottom first, in seven lines."""
+    def printed_rows(self) -> tuple[str, Rows]:
+        """Layout, and the values of every surface and body, bottom first, in six rows."""
         columns = {"R [m]": "radius", "s_c [m]": "capacity", "mu": "friction", "d_y [m]": "yield_displacement"}
         rows = {label: [getattr(part, name) for part in self.surfaces] for label, name in columns.items()}
         rows |= {"l [m]": [self.base_height, *(part.height for part in self.bodies)]}
         rows |= {"m [kg]": [part.mass for part in self.bodies]}
-        lines = (f"  {label:<9}{', '.join(f'{x:.4g}' for x in values)}" for label, values in rows.items())
-        return "\n".join([f"Bearing {self.layout.name}", *lines])
+        shown = [(label, ", ".join(f"{x:.4g}" for x in values)) for label, values in rows.items()]
+        return f"Bearing {self.layout.name}", shown
 
     def slider(self, surface: int) -> int:
         """Index 0..n-1, base first, of the slider of a surface (index from 0): the body that meets its rim.

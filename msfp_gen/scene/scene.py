@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import check_fields, require_type
+from msfp_gen.common.tables import Printed, Rows
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.motions.time_grid import TIME_TOLERANCE
@@ -35,8 +36,8 @@ WIDER: dict[str, tuple[str, Any]] = {
 }
 
 
-@dataclass(frozen=True, init=False)
-class Scene(SceneFields):
+@dataclass(frozen=True, init=False, repr=False)
+class Scene(Printed, SceneFields):
     """The complete input of `simulate`.
 
     bearing, motion (of the base), top, solver: see their classes. duration [s]; None: that of the motion.
@@ -72,8 +73,8 @@ class Scene(SceneFields):
         if self.effects.dimension == "planar":
             self._check_plane()
 
-    def __repr__(self) -> str:
-        """The parts of the scene in seven lines."""
+    def printed_rows(self) -> tuple[str, Rows]:
+        """The parts of the scene in six rows at most."""
         layout, motion, effects = self.bearing.layout, self.motion, self.effects
         names = [f"{name} = {value}" for name, value in vars(effects).items() if value is not None]
         selected = isinstance(effects, Auto)
@@ -91,7 +92,7 @@ class Scene(SceneFields):
             "solver": f"{self.solver.method}, rtol {self.solver.rtol:g}, until {self.end:.6g} s",
             **({"also": ", ".join(extras)} if extras else {}),
         }
-        return "\n".join([f"Scene {self.name or 'without a name'}", *(f"  {k:<9}{v}" for k, v in rows.items())])
+        return f"Scene {self.name or 'without a name'}", list(rows.items())
 
     @property
     def spec(self) -> ModelSpec:

@@ -71,6 +71,25 @@ def test_a_building_prints_its_parts() -> None:
     assert "15.09 MN" in lines[1] and "12, (n, m, p) = 5_2_2" in lines[2] and "ridgecrest-2019-ci-clc" in lines[3]
 
 
+def test_a_superstructure_prints_its_sizes_and_no_matrices() -> None:
+    lines = repr(load_scene("hospital-clc").building).splitlines()
+    assert lines[0] == "Building" and len(lines) == 5 and max(map(len, lines)) < 100
+    assert lines[1].split() == ["mass", "1.54e+06", "kg"] and "floor 3" in lines[2]
+    assert [float(word) for word in re.findall(r"[\d.]+", lines[4])][:2] == pytest.approx([2.0, 2.2], abs=0.05)  # [Hz]
+
+
+@pytest.mark.parametrize("name", ["fenz-test2", "hospital-clc"])
+def test_a_notebook_shows_scenes_bearings_and_buildings_in_ten_rows(name: str) -> None:
+    scene = replace(load_scene(name), name="<b>")
+    parts = (scene.bearings[0].bearing, scene.building) if name == "hospital-clc" else (scene.bearing,)
+    for shown in (scene, *parts):
+        html = shown._repr_html_()
+        labels = re.findall(r"<th>(.*?)</th>", html)
+        assert 4 <= len(labels) <= 9 and len(html) < 2000
+        assert [each.split()[0] for each in labels] == [line.split()[0] for line in repr(shown).splitlines()[1:]]
+    assert "Scene &lt;b&gt;</b>" in scene._repr_html_()
+
+
 def test_the_names_of_the_package_are_the_public_ones() -> None:
     assert dir(msfp_gen) == sorted(msfp_gen.__all__) and msfp_gen.BuildingResult.__name__ == "BuildingResult"
 
