@@ -364,9 +364,9 @@ def section(title: str, path: str, kind: type) -> str:
     rows = []
     tables = TABLES["building" if kind is BuildingScene or path.startswith("building") else "bearing"]
     path = path or ("" if kind is Scene else "building_scene")
-    fields = tables["" if path == "building_scene" else path].model_fields
-    for key in sorted(fields, key=lambda name: not fields[name].is_required()):
-        rule, given = EXTRA.get(key) or rules.get(key, (None, MISSING if fields[key].is_required() else None))
+    keys = tables["" if path == "building_scene" else path].keys
+    for key in sorted(keys, key=lambda name: not keys[name].required):
+        rule, given = EXTRA.get(key) or rules.get(key, (None, MISSING if keys[key].required else None))
         shown = f'`"{kind.kind}"`' if key == "kind" else takes(rule)  # type: ignore[attr-defined]
         if key == "least_share":
             shown = takes(Quantity("", above=0.0))

@@ -26,7 +26,7 @@ from msfp_gen.scene.file.loader import (
     scene_parts,
 )
 from msfp_gen.scene.file.motion_tables import Paths, located, motion_from, paths_in, resolved
-from msfp_gen.scene.file.schema import EFFECTS, MOTION, PARTS, model_of, rows_of, validate, without
+from msfp_gen.scene.file.schema import EFFECTS, LIMITS, MOTION, SOLVER, Key, ListOf, Value, keys_of, required, validate
 from msfp_gen.scene.file.source import MOTION_PATHS
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import Kind
@@ -70,33 +70,40 @@ class GridTable:
     y: Annotated[tuple[float, ...], Quantity("m", shape=(None,))]
 
 
-_INTERFACE, _SOIL, _BASE, _STOREY, _NODE = (model_of(kind) for kind in (NodeTop, Soil, BaseSlab, Storey, NodeTable))
-_BEARING = model_of(
-    BuildingBearing,
-    bearing=(Any, ...),
-    grid=(model_of(GridTable), None),
-    interface=(_INTERFACE, None),
-    soil=(_SOIL, None),
-    effects=(EFFECTS, None),
-    motion=(MOTION, None),
-)
-_BUILDING = model_of(
+_INTERFACE, _SOIL, _BASE, _STOREY, _NODE = (keys_of(kind) for kind in (NodeTop, Soil, BaseSlab, Storey, NodeTable))
+
+
+def _any(value: Any, *, text: bool) -> Any:
+    """A bearing, which `_bearing_values` reads."""
+    return value
+
+
+def _tables(value: Any, *, text: bool) -> Table:
+    """The table `[bearings]`, whose tables are read by name."""
+    if not isinstance(value, Mapping):
+        raise ValueError("give a table")
+    return dict(value)
+
+
+_COMMON = {"interface": Key(_INTERFACE), "soil": Key(_SOIL), "effects": Key(EFFECTS)}
+_SINGLE = {**_COMMON, "motion": Key(MOTION)}
+_BEARING = keys_of(BuildingBearing, bearing=required(Value(_any)), grid=Key(keys_of(GridTable)), **_SINGLE)
+_STORED = keys_of(BuildingBearing, bearing=required(Value(_any)), **_SINGLE)
+_BUILDING = keys_of(
     FrameTable,
-    base=(_BASE, None),
-    storey=(rows_of(_STOREY), []),
-    node=(rows_of(_NODE), []),
-    bearing=(rows_of(_BEARING), ...),
-    interface=(_INTERFACE, None),
-    soil=(_SOIL, None),
-    effects=(EFFECTS, None),
+    base=Key(_BASE),
+    storey=Key(ListOf(_STOREY)),
+    node=Key(ListOf(_NODE)),
+    bearing=required(ListOf(_BEARING)),
+    **_COMMON,
 )
-SCENE = model_of(
+SCENE = keys_of(
     BuildingScene,
-    building=(_BUILDING, ...),
-    bearings=(dict[str, Any], {}),
-    motion=(MOTION, ...),
-    solver=(PARTS["solver"], None),
-    limits=(PARTS["limits"], None),
+    building=required(_BUILDING),
+    bearings=Key(Value(_tables)),
+    motion=required(MOTION),
+    solver=Key(SOLVER),
+    limits=Key(LIMITS),
 )
 _buildings: InputCache[Building] = InputCache(256 << 20, lambda building: 3 * building.mass.nbytes)
 MATRICES = paths_in(FrameTable)
@@ -207,7 +214,7 @@ def _of_matrices(table: Table, options: Table) -> Building:
 def stored_bearing(row: Table, index: int) -> BuildingBearing:
     """A bearing from a complete table of a result file, in SI units. Raises InputError."""
     path = f"bearing[{index}]"
-    return _bearing(validate(without(_BEARING, {"grid"}, row), row), path, {}, None, {})
+    return _bearing(validate(_STORED, row), path, {}, None, {})
 
 
 def _bearing(row: Table, path: str, named: Table, folder: Path | None, bearings: dict[str, Bearing]) -> BuildingBearing:

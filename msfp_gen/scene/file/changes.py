@@ -124,7 +124,7 @@ def _inner_places(walk: _Walk, inner: Any, keys: list[Key], common: Mapping[str,
 
 def _is_kind(key: str) -> bool:
     """Whether a table of a scene file tells its kind; the tables of one bearing are asked first, and load no kinds."""
-    return key not in SCENE.model_fields and key in kinds()
+    return key not in SCENE.keys and key in kinds()
 
 
 def _column(walk: _Walk, bearing: Table, name: str) -> Iterator[_Place]:

@@ -111,18 +111,18 @@ def scene_from_table(table: Mapping[str, Any], folder: Path | None = None, parts
     return reduced
 
 
-def scene_parts(model: schema.Model, table: Mapping[str, Any], folder: Path | None, others: Parts) -> Table:
+def scene_parts(keys: schema.Keys, table: Mapping[str, Any], folder: Path | None, others: Parts) -> Table:
     """The parts of a scene, of one bearing or of a building, by name.
 
-    model: of its file. others: those for which there are no tables. Other arguments and errors are those of
+    keys: of its file. others: those for which there are no tables. Other arguments and errors are those of
     `scene_from_table`. What is no part stays as validated.
     """
-    parts, valid = dict(others), schema.validate(schema.without(model, others.keys() - table.keys(), table), table)
+    parts, valid = dict(others), schema.validate(keys, table, others)
     if "motion" in valid:
-        keys = located(valid.pop("motion"), folder)
-        parts["motion"] = motion_from(keys)
-        if model is schema.SCENE:
-            parts["motion_table"] = keys
+        motion = located(valid.pop("motion"), folder)
+        parts["motion"] = motion_from(motion)
+        if keys is schema.SCENE:
+            parts["motion_table"] = motion
     return parts | {name: _PARTS[name](value) if name in _PARTS else value for name, value in valid.items()}
 
 

@@ -58,7 +58,7 @@ def scene_of(table: Mapping[str, Any], folder: Path | None = None, parts: Parts 
 
 def kind_of(table: Mapping[str, Any]) -> Kind | None:
     """The kind of the system of a table; None: a scene of one bearing. Raises InputError for tables of two kinds."""
-    others = [key for key in table if key not in SCENE.model_fields]
+    others = [key for key in table if key not in SCENE.keys]
     found = [kinds()[key] for key in others if key in kinds()]
     if len(found) > 1:
         raise InputError(f"{found[0].key} and {found[1].key}: a scene is of one kind; leave one of the tables out")
