@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from msfp_gen.common.version import __version__
 
 if TYPE_CHECKING:
+    from msfp_gen.auditing import audit as audit
     from msfp_gen.buildings.building import Building as Building
     from msfp_gen.buildings.result import BuildingResult as BuildingResult
     from msfp_gen.buildings.scene import BuildingBearing as BuildingBearing
@@ -84,6 +85,7 @@ _MODULES = {
     "Surface": "scene.bearing",
     "Top": "scene.top",
     "TwoPort": "embedding.two_port",
+    "audit": "auditing",
     "bound": "studies.bounding",
     "build_model": "model.model",
     "changed_scene": "scene.file.source",

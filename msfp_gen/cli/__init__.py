@@ -9,6 +9,7 @@ import typer
 
 from msfp_gen.cli import (
     assessment_commands,
+    audit_commands,
     batch_commands,
     figure_commands,
     model_commands,
@@ -35,7 +36,7 @@ app = typer.Typer(
 # This order is the order of the commands in the help text.
 for group in (
     run_commands, batch_commands, study_commands, figure_commands, assessment_commands, record_commands,
-    sheet_commands, model_commands,
+    sheet_commands, audit_commands, model_commands,
 ):  # fmt: skip
     app.add_typer(group.app)
 

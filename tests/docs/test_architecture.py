@@ -23,7 +23,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 ORDER = (
     "common", "specification", "generator", "templates", "runtime", "jit", "motions", "scene",
     "model", "embedding", "results", "design", "figures", "simulation",
-    "studies", "report", "buildings", "", "cli", "__main__",
+    "studies", "report", "auditing", "buildings", "", "cli", "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

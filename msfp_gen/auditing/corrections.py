@@ -1,0 +1,120 @@
+"""Signs and units of a file: what has to be turned or scaled before anything else can be read."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from msfp_gen.auditing.checks import INCONSISTENT, Reading
+from msfp_gen.auditing.histories import Histories
+from msfp_gen.auditing.momentum import momentum
+from msfp_gen.auditing.sliding import CLOSED, ERRORS, Sliding
+from msfp_gen.auditing.stated import Stated
+from msfp_gen.common.arrays import Array
+
+AGAINST = 0.1  # work against the motion over the sum of its parts, from which on a sign is wrong
+FAR = 1.5  # ratio from which on a unit is suspected
+CLOSE = 0.1  # difference of radius and friction with the right unit
+LENGTHS = {1e3: "millimetres", 1e2: "centimetres", 39.3701: "inches", 3.28084: "feet", 1e-3: "kilometres"}
+FORCES = {
+    1e3: "newtons",
+    1e-3: "kilonewtons",
+    1e6: "newtons",
+    1e-6: "meganewtons",
+    0.2248089: "pounds",
+    2.248089e-4: "kips",
+    0.1019716: "kilogram-forces",
+}
+GRAVITY = 9.80665
+
+
+def corrected(data: Histories, stated: Stated) -> tuple[Histories, dict[str, Reading]]:
+    """Histories with signs and units put right, and what was found."""
+    found: dict[str, Reading] = {}
+    factors, texts = _signs(data)
+    data = data.scaled(factors)
+    if texts:
+        found["signs"] = Reading(INCONSISTENT, "; ".join(texts) + "; it is turned in what follows")
+    factors, text, value = _units(data, stated)
+    if text:
+        found["units"] = Reading(INCONSISTENT, f"{text}; it is put right in what follows", value)
+        data = data.scaled(factors)
+    return data, found
+
+
+def _signs(data: Histories) -> tuple[dict[str, float], list[str]]:
+    """Columns to turn, and why."""
+    factors, texts = {}, []
+    if "axial" in data.columns and data.at_rest < 0:
+        factors["axial"] = -1.0
+        texts.append("the axial force at rest is negative, where compression is positive")
+    turned = []
+    for axis in (1, 2):
+        names = (f"force_{axis}", f"displacement_{axis}")
+        if all(name in data.columns for name in names):
+            force, u = (data.columns[name] for name in names)
+            parts = 0.5 * (force[1:] + force[:-1]) * np.diff(u)
+            if parts.sum() < -AGAINST * np.abs(parts).sum():
+                turned.append(names[0])
+                factors[names[0]] = -1.0
+    if turned:
+        texts.append(f"{' and '.join(turned)} and displacement have opposite signs: the loop gives energy")
+    return factors, texts
+
+
+def _ratio(data: Histories, stated: Stated) -> float:
+    """How far sizes are off: 1 where force, displacement and capacity fit together."""
+    size = np.hypot(*data.displacement.T)
+    closed = data.axial > CLOSED * data.at_rest
+    lean = np.hypot(*data.force[closed].T) / data.axial[closed]
+    most = stated.friction + size[closed] / stated.radius
+    inside = size[closed] < stated.first_rim
+    beyond = float((lean / np.maximum(most, 1e-12))[inside].max()) if inside.any() else 1.0
+    sliding = Sliding(data, stated)
+    worst = max(beyond, float(size.max()) / stated.capacity / 2.0)
+    if sliding.enough:
+        factors = sliding.fit.factors
+        for name in ("radius", "friction"):
+            if name in factors:
+                size, error = abs(factors[name].value), ERRORS * factors[name].error
+                worst = max(worst, size - error, 1.0 / (size + error))
+    return worst
+
+
+def _units(data: Histories, stated: Stated) -> tuple[dict[str, float], str, float | None]:
+    """Factors of columns in another unit, the sentence, and the factor; no text where all units fit."""
+    whole = not data.missing("displacement", "force", "axial") and data.at_rest > 0
+    if whole and _ratio(data, stated) > FAR and (found := _other_unit(data, stated)) is not None:
+        return found
+    inertia = momentum(data)
+    if inertia is not None and inertia.one_mass and "axial" in data.columns:
+        ratio = inertia.mass / (data.at_rest * data.bearings / stated.bearing.gravity)
+        for factor, words in ((1.0 / GRAVITY, "m/s², named g"), (GRAVITY, "g, named m/s²")):
+            if abs(ratio / factor - 1.0) < CLOSE:
+                names = [name for name in data.columns if name.startswith(("acceleration", "position"))]
+                text = f"shear over acceleration implies {ratio:.3g} of the mass: the acceleration looks like {words}"
+                return dict.fromkeys(names, factor), text, factor
+    return {}, "", None
+
+
+def _other_unit(data: Histories, stated: Stated) -> tuple[dict[str, float], str, float] | None:
+    """The unit of one quantity with which radius and friction are those stated; None: there is none."""
+    best: tuple[float, dict[str, float], str, float] | None = None
+    for kind, units in (("displacement", LENGTHS), ("force", FORCES), ("axial", FORCES)):
+        names = [name for name in data.columns if name.startswith(kind)]
+        for factor, unit in units.items():
+            off = _fits(data.scaled(dict.fromkeys(names, 1.0 / factor)), stated)
+            if off is not None and (best is None or off < best[0]):
+                what = "axial force" if kind == "axial" else kind
+                text = f"the {what} is {factor:g} times what the bearing has: it looks like {unit} with another unit"
+                best = (off, dict.fromkeys(names, 1.0 / factor), f"{text} named", factor)
+    return None if best is None else best[1:]
+
+
+def _fits(data: Histories, stated: Stated) -> float | None:
+    """Difference of radius and friction from the stated ones; None where it is not small."""
+    sliding = Sliding(data, stated)
+    if not sliding.enough:
+        return None
+    factors = sliding.fit.factors
+    off: Array = np.abs([factors[name].value - 1.0 for name in ("radius", "friction") if name in factors])
+    return float(off.max()) if len(off) == 2 and off.max() < CLOSE else None

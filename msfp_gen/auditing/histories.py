@@ -1,0 +1,139 @@
+"""Time histories of a bearing by any program, in SI units and one sign: what an audit reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
+from msfp_gen.motions.checks import finite
+
+# Column -> unit and meaning; the number is that of the axis: 1, 2 horizontal, 3 upwards.
+QUANTITIES: dict[str, tuple[str, str]] = {
+    "time": ("s", "time"),
+    **{f"displacement_{i}": ("m", "horizontal displacement across the bearing, of either sign") for i in (1, 2)},
+    **{f"force_{i}": ("N", "horizontal force of one bearing, of the sign of the displacement") for i in (1, 2)},
+    "axial": ("N", "axial force of one bearing, compression positive"),
+    "rise": ("m", "vertical displacement of the upper plate against the lower one, upwards"),
+    **{f"acceleration_{i}": ("m/s^2", "absolute acceleration of the supported mass") for i in (1, 2, 3)},
+    **{f"position_{i}": ("m", "absolute displacement of the supported mass") for i in (1, 2, 3)},
+    **{f"base_acceleration_{i}": ("m/s^2", "acceleration of the base") for i in (1, 2, 3)},
+}  # fmt: skip
+LEAST_ROWS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Histories:
+    """Time histories of one bearing.
+
+    Attributes:
+        name: of the file or run, for tables and pages.
+        columns: by the names of `QUANTITIES`, ndarray, shape (T,) each, SI; `time` is one of them.
+        mass: supported by all bearings together, as the source states it [kg]; None: it is not stated.
+        bearings: number of bearings that share it alike.
+
+    Raises:
+        InputError: fewer than 20 rows, numbers that are not finite, or times that do not increase.
+    """
+
+    name: str
+    columns: Mapping[str, Array]
+    mass: float | None = None
+    bearings: float = 1.0
+
+    def __post_init__(self) -> None:
+        if "time" not in self.columns:
+            raise InputError(f"{self.name}: no column time; name it in the map (docs/audit.md)")
+        columns = {name: finite(f"{self.name}: {name}", values) for name, values in self.columns.items()}
+        object.__setattr__(self, "columns", columns)
+        if unknown := sorted(columns.keys() - QUANTITIES.keys()):
+            raise InputError(f"{self.name}: {unknown[0]!r} is no quantity; give {', '.join(QUANTITIES)}")
+        if len(self.time) < LEAST_ROWS:
+            raise InputError(f"{self.name}: {len(self.time)} rows; give at least {LEAST_ROWS}")
+        if len(back := np.flatnonzero(np.diff(self.time) <= 0)):
+            row = int(back[0]) + 2
+            raise InputError(
+                f"{self.name}, row {row}: time = {self.time[row - 1]:g} s does not increase; sort or cut it"
+            )
+        for name, values in columns.items():
+            if values.shape != self.time.shape:
+                raise InputError(f"{self.name}: {name} has shape {values.shape}; give one number for each time")
+
+    @property
+    def time(self) -> Array:
+        """Times of the rows, ndarray, shape (T,) [s]."""
+        return self.columns["time"]
+
+    def missing(self, *names: str) -> list[str]:
+        """Those of these columns that are not there; `force` and `displacement` stand for one axis at least."""
+        return [name for name in names if name not in self.columns and f"{name}_1" not in self.columns and
+                f"{name}_2" not in self.columns]  # fmt: skip
+
+    def vector(self, name: str, axes: int = 2) -> Array:
+        """Columns `name`_1, ... , zero where one is not given, ndarray, shape (T, axes) [SI]."""
+        zero = np.zeros_like(self.time)
+        return np.column_stack([self.columns.get(f"{name}_{i + 1}", zero) for i in range(axes)])
+
+    @cached_property
+    def displacement(self) -> Array:
+        """Horizontal displacement across the bearing, ndarray, shape (T, 2) [m]."""
+        return self.vector("displacement")
+
+    @cached_property
+    def force(self) -> Array:
+        """Horizontal force, ndarray, shape (T, 2) [N]."""
+        return self.vector("force")
+
+    @cached_property
+    def velocity(self) -> Array:
+        """Rate of the displacement by central differences, ndarray, shape (T, 2) [m/s]."""
+        rate: Array = np.gradient(self.displacement, self.time, axis=0)
+        return rate
+
+    @property
+    def axial(self) -> Array:
+        """Axial force, compression positive, ndarray, shape (T,) [N]."""
+        return self.columns["axial"]
+
+    @property
+    def at_rest(self) -> float:
+        """Median of the axial force [N]."""
+        return float(np.median(self.axial))
+
+    @property
+    def step(self) -> float:
+        """Median distance of two rows [s]."""
+        return float(np.median(np.diff(self.time)))
+
+    def scaled(self, factors: Mapping[str, float]) -> Histories:
+        """Histories with some columns multiplied."""
+        return replace(self, columns={name: values * factors.get(name, 1.0) for name, values in self.columns.items()})
+
+    def moved_at(self) -> int:
+        """First row at which the displacement has reached a hundredth of its largest."""
+        size = np.hypot(*self.displacement.T)
+        return int(np.argmax(size >= 0.01 * size.max()))
+
+
+def histories_of(result: Any) -> Histories:
+    """The histories of a result of this package: of one bearing. Raises InputError for results of buildings."""
+    if len(result.bearings) != 1 or result.bearings[0].mounting is not None:
+        raise InputError("result: this is the result of a building; give one of its .bearings as a table of columns")
+    rows, top = result.history, result.scene.top
+    columns = {"time": rows.time, "axial": rows.top_force[:, 2], "rise": -rows.displacement[:, 2]}
+    for axis in range(2):
+        columns |= {
+            f"displacement_{axis + 1}": rows.displacement[:, axis],
+            f"force_{axis + 1}": rows.top_force[:, axis],
+        }
+    free = top.kind == "mass" and not top.height
+    if free:
+        columns |= {f"position_{axis + 1}": rows.top_displacement[:, axis] for axis in range(3)}
+        if rows.top_settlement is not None:
+            columns["position_3"] = rows.top_displacement[:, 2] - rows.top_settlement
+    return Histories(result.title, columns, mass=top.mass if top.kind == "mass" else None)

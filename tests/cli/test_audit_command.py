@@ -1,0 +1,93 @@
+"""`msfp-gen audit` prints findings, writes a page, and ends with 1 where something is inconsistent."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+from support import ROOT
+from support.audits import run_of, shaken
+
+from msfp_gen.cli import main
+from msfp_gen.scene.file.loader import scene_text
+
+PAGE = (ROOT / "docs" / "audit.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def files(tmp_path):
+    """A table of a shaken mass with a map, and its scene; the force of half the bearings."""
+    data, scene = run_of(), shaken()
+    names = [name for name in data.columns if not name.startswith("position")]
+    table = np.column_stack([data.columns[name] for name in names])
+    table[:, [names.index("force_1"), names.index("axial")]] *= 0.5e-3
+    np.savetxt(tmp_path / "out.csv", table, delimiter=",", header=",".join(names), comments="", fmt="%.9g")
+    units = {"time": "s", "axial": "kN", "force_1": "kN", "force_2": "N"}
+    columns = [f'{name} = "{name} [{units.get(name, "m")}]"' for name in names]
+    (tmp_path / "map.toml").write_text("\n".join(['mass = "204081.6 kg"', "[columns]", *columns]))
+    (tmp_path / "scene.toml").write_text(scene_text(scene))
+    return tmp_path
+
+
+def test_what_is_inconsistent_is_printed_and_drawn(files, capsys):
+    arguments = [
+        "audit",
+        str(files / "out.csv"),
+        "--bearing",
+        str(files / "scene.toml"),
+        "--map",
+        str(files / "map.toml"),
+    ]
+    assert main([*arguments, "--page", str(files / "audit.html")]) == 1
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "inconsistent: weight; " in printed and "half of the bearings" in printed
+    page = (files / "audit.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png") >= 5 and "half of the bearings" in page
+    assert main([*arguments, "--json"]) == 1
+    found = {one["check"]: one for one in json.loads(capsys.readouterr().out)["findings"]}
+    assert found["weight"]["verdict"] == "inconsistent" and found["weight"]["value"] == pytest.approx(0.5, rel=0.01)
+    assert found["mass"]["verdict"] == "not decidable"
+
+
+def test_a_preset_is_audited_against_itself(tmp_path, capsys):
+    assert main(["run", "fenz-test3", "-o", str(tmp_path / "run.nc")]) == 0
+    capsys.readouterr()
+    assert main(["audit", str(tmp_path / "run.nc"), "--bearing", "fenz-test3"]) == 0
+    assert "nothing inconsistent" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["out.csv", "--bearing", "no-such"], "no such file"),
+        (["missing.csv", "--bearing", "fenz-test3", "--map", "map.toml"], "missing.csv"),
+        (["out.csv", "--bearing", "hospital-ccc", "--map", "map.toml"], "more than one bearing"),
+        (["out.csv", "--bearing", "fenz-test3", "--map", "map.toml", "--page", "x.pdf"], "--page"),
+    ],
+)
+def test_bad_input_is_one_line(files, capsys, monkeypatch, arguments, words):
+    monkeypatch.chdir(files)
+    assert main(["audit", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: ") and words in error and error.count("\n") == 1
+
+
+def test_the_page_lists_columns_and_checks():
+    from msfp_gen.auditing.checks import CHECKS
+    from msfp_gen.auditing.histories import QUANTITIES
+
+    rows = set(re.findall(r"^\| `(\w+)`", PAGE, re.MULTILINE))
+    assert set(CHECKS) <= rows
+    listed = set(re.findall(r"`(\w+)`", "\n".join(re.findall(r"^\|.*", PAGE, re.MULTILINE))))
+    assert {name for name in QUANTITIES if not name.endswith("_2") or "position" not in name} - listed <= {
+        "acceleration_2", "position_2", "base_acceleration_2"
+    }  # fmt: skip
+
+
+def test_the_example_of_the_page_prints_what_it_says(capsys):
+    code = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[0]
+    exec(code, {})
+    said = re.search(r"It prints `(.*?)`", PAGE)
+    assert said and capsys.readouterr().out.strip() == said[1]

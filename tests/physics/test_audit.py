@@ -1,0 +1,171 @@
+"""The audit finds what is wrong in spoiled results, and nothing in sound ones (docs/audit.md)."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from support.audits import SPACE, SPOILED, rows_of, run_of, shaken, straightened, with_columns, with_force
+
+from msfp_gen import audit, load_scene, simulate
+from msfp_gen.auditing.histories import histories_of
+from msfp_gen.auditing.momentum import momentum
+from msfp_gen.auditing.sliding import Sliding
+from msfp_gen.auditing.stated import stated_of
+
+
+@cache
+def spoiled(name):
+    """The audit of a spoiled result, and the check that must name it."""
+    data, bearing, check = SPOILED[name]()
+    return audit(data, bearing), check, data
+
+
+@pytest.mark.parametrize("name", SPOILED)
+def test_what_is_spoiled_is_named(name):
+    found, check, data = spoiled(name)
+    assert check in [finding.check for finding in found.inconsistent]
+    place = found.finding(check)
+    assert place.time is None or data.time[0] <= place.time <= data.time[-1]
+
+
+def test_one_mistake_hides_and_makes_no_other():
+    """Signs, units, bearings and heat are named alone; the others with what follows from them."""
+    alone = {"sign turned", "clipped", "unit wrong", "half the bearings", "heat off", "friction at the pivot"}
+    for name in alone:
+        found, check, _ = spoiled(name)
+        assert [finding.check for finding in found.inconsistent] == [check], name
+
+
+def test_numbers_are_those_that_were_put_in():
+    found = {name: spoiled(name)[0].finding(spoiled(name)[1]) for name in SPOILED}
+    mass = 2e6 / shaken().bearing.gravity
+    assert found["mass doubled"].value == pytest.approx(2 * mass, rel=0.01)
+    assert "inertia acts twice" in found["mass doubled"].sentence
+    assert found["heat off"].value == pytest.approx(0.0, abs=0.05)
+    assert found["friction at the pivot"].value == pytest.approx(0.928, abs=0.01)
+    assert "at the pivot" in found["friction at the pivot"].sentence
+    assert found["unit wrong"].value == 1e3 and "millimetres" in found["unit wrong"].sentence
+    assert found["vertical coupling off"].value == pytest.approx(0.0, abs=0.05)
+    assert found["half the bearings"].value == pytest.approx(0.5, rel=0.01)
+    assert found["other radius"].value == pytest.approx(2.69, rel=0.01)  # of the dish and the joint
+
+
+@pytest.mark.parametrize("law", ["constant", "pvt"])
+def test_a_sound_result_has_its_own_numbers(law):
+    found = audit(run_of(law=law), shaken(law=law))
+    assert not found.inconsistent
+    assert found.finding("mass").value == pytest.approx(2e6 / shaken().bearing.gravity, rel=5e-3)
+    assert found.finding("radius").value == pytest.approx(2.19, rel=0.01)
+    assert found.finding("friction").value == pytest.approx(1.0, abs=0.02)
+    assert found.finding("lift").value == pytest.approx(1.0, abs=0.1)
+    assert found.finding("coupling").value == pytest.approx(1.0, abs=0.02)
+    if law == "pvt":
+        assert found.finding("heat").value == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("change", ["coarse", "filtered", "small", "resting", "no columns"])
+def test_sound_results_stay_sound_when_little_is_known(change):
+    scene, data = shaken(), run_of()
+    if change == "coarse":
+        data = rows_of(data, 5)
+    elif change == "filtered":  # the same filter on all columns, as recorders have it
+        kernel = np.hanning(9) / np.hanning(9).sum()
+        smooth = {n: np.convolve(v, kernel, "valid") for n, v in data.columns.items() if n != "time"}
+        data = type(data)(data.name, {"time": data.time[4:-4], **smooth}, data.mass)
+    elif change == "small":
+        scene, data = shaken(scale=0.2), run_of(scale=0.2)
+    elif change == "resting":  # ten seconds without motion before it
+        still = {n: np.full(1000, v[0]) for n, v in data.columns.items()} | {"time": np.arange(1000) * 0.01}
+        shifted = {**data.columns, "time": data.time + 10.0}
+        data = type(data)(data.name, {n: np.append(still[n], shifted[n]) for n in shifted}, data.mass)
+    else:
+        data = type(data)(data.name, {"time": data.time, "force_1": data.columns["force_1"]})
+    found = audit(data, scene)
+    assert not found.inconsistent, found.text
+    if change == "no columns":
+        assert {f.verdict for f in found.findings if f.check not in ("clipped",)} == {"not decidable"}
+        assert "displacement" in found.finding("friction").sentence
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        ({"force_1": 1e-3}, "kilonewtons"),
+        ({"displacement_1": 39.3701}, "inches"),
+        ({"axial": 1e-3}, "axial force"),
+        ({"position_1": 1 / 9.80665, "position_2": 1 / 9.80665, "position_3": 1 / 9.80665}, "looks like"),
+    ],
+)
+def test_wrong_units_are_named(columns, words):
+    found = audit(run_of().scaled(columns), shaken())
+    assert words in found.finding("units").sentence
+    assert "units" in [finding.check for finding in found.inconsistent]
+
+
+def test_other_mistakes_are_named():
+    data, scene = run_of(), shaken()
+    flipped = audit(data.scaled({"axial": -1.0}), scene)
+    assert [f.check for f in flipped.inconsistent] == ["signs"]
+    assert "interpolated" in audit(straightened(data, 5), scene).finding("sampling").sentence
+    noise = 0.02 * data.at_rest * np.random.default_rng(0).standard_normal((len(data.time), 1))
+    assert "chatters" in audit(with_force(data, 1.0, noise), scene).finding("chatter").sentence
+    row = int(Sliding(data, stated_of(scene)).rows[40])
+    spike = np.zeros((len(data.time), 1))
+    spike[row] = 0.04 * data.at_rest
+    found = audit(with_force(data, 1.0, spike), scene).finding("chatter")
+    assert "spike" in found.sentence and found.time == pytest.approx(data.time[row], abs=0.02)
+    no_rise = audit(with_columns(data, rise=0.0 * data.time), scene)
+    assert [f.check for f in no_rise.inconsistent] == ["lift"]
+
+
+def test_a_force_that_pushes_is_named():
+    """The friction of some strokes acts along the motion: the bearing makes energy there."""
+    data, scene = run_of(), shaken()
+    sliding = data.axial[:, None] * np.sign(data.velocity) * 0.0646
+    pushed = with_force(data, 1.0, -1.5 * sliding * ((data.time > 8) & (data.time < 11))[:, None])
+    found = audit(pushed, scene).finding("energy")
+    assert found.verdict == "inconsistent" and 8 < found.time < 11.5
+
+
+def test_momentum_does_not_differentiate():
+    """A mass of 3 kg on a known force, with noise on the position as of a printed column."""
+    data = run_of()
+    time = np.arange(0.0, 20.0, 0.01)
+    force = 3.0 * -((2 * np.pi * 0.7) ** 2) * np.sin(2 * np.pi * 0.7 * time)
+    position = np.round(np.sin(2 * np.pi * 0.7 * time), 4)
+    found = momentum(type(data)("by hand", {"time": time, "force_1": force, "position_1": position}))
+    assert found.mass == pytest.approx(3.0, rel=1e-3) and found.one_mass
+
+
+@pytest.mark.parametrize("name", ["fenz-test2", "fenz-test3", "fenz-test5", "unusual-tfp", "becker-circle-50"])
+def test_presets_are_sound(name):
+    scene = load_scene(name)
+    found = audit(simulate(scene), scene)
+    assert not found.inconsistent, found.text
+
+
+def test_the_bound_of_a_stack_is_reached():
+    """In stage III of Fenz and Constantinou both outermost surfaces of a triple pendulum slide."""
+    scene = load_scene("fenz-test3")
+    found = audit(simulate(scene), scene)
+    stated = stated_of(scene)
+    surfaces = scene.bearing.surfaces
+    outer = [surfaces[0].friction * surfaces[0].radius, surfaces[3].friction * surfaces[3].radius]
+    assert stated.radius == pytest.approx(2 * 0.435) and stated.friction == pytest.approx(sum(outer) / 0.87)
+    assert found.finding("friction_bound").value == pytest.approx(stated.friction, rel=0.02)
+    assert histories_of(simulate(scene)).mass is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["constant", "velocity", "pvt"])
+@pytest.mark.parametrize("axes", [(1.0, 0.0, 0.0), SPACE])
+@pytest.mark.parametrize("kind", ["single-articulated-push", "double-push", "triple-push"])
+def test_forty_sound_results(law, axes, kind):
+    """With five shorter and stronger motions, of which coarse rows are taken too."""
+    changes = {"friction_slow": 0.03, "velocity_rate": 150.0} if law == "velocity" else {}
+    for scale, step in ((0.3, 0.01), (1.0, 0.01), (1.0, 0.04)):
+        choices = {"law": law, "axes": axes, "preset": kind, "scale": scale, "step": step, **changes}
+        found = audit(run_of(**choices), shaken(**choices))
+        assert not found.inconsistent, (scale, step, [f.sentence for f in found.inconsistent])
