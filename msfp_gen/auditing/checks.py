@@ -37,9 +37,13 @@ NONE, SHOWN = "", 2000  # rows of a drawing
 
 
 class Drawing(NamedTuple):
-    """The evidence of a finding: curves (label, x, y), labels of the axes, and the place (x, y) that it names.
+    """The evidence of a finding.
 
-    Points are drawn where `points` is set, else lines.
+    Attributes:
+        curves: (label, x, y), shape (k,) each [unit of the axis].
+        x, y: labels of the axes.
+        place: (x, y) that the finding names.
+        points: whether points are drawn, not lines.
     """
 
     curves: list[tuple[str, Array, Array]]
@@ -116,7 +120,7 @@ class Case:
 
     @cached_property
     def lean(self) -> Array:
-        """Horizontal force over axial force, (T, 2); 0 where the bearing may be opening."""
+        """Horizontal force over axial force, (T, 2) [-]; 0 where it may be opening."""
         data = self.data
         closed = data.axial > CLOSED * data.at_rest
         return np.where(closed[:, None], data.force / np.where(closed, data.axial, 1.0)[:, None], 0.0)
@@ -146,7 +150,7 @@ class Case:
 
 
 def thinned(values: Array) -> Array:
-    """Some rows for a drawing."""
+    """Some rows for a drawing, shape (k,) [unit of `values`]."""
     return values[:: -(-len(values) // SHOWN)]
 
 

@@ -35,7 +35,10 @@ OWN = {
 
 
 class TextTable(NamedTuple):
-    """A table of text: its lines, names of columns (none: it has no header), units in a line of their own, and rows."""
+    """A table of text: its lines, names of columns (none: it has no header), units in a line of their own, and rows.
+
+    values: shape (T, columns) [unit of the column].
+    """
 
     lines: Lines
     names: list[str]
@@ -43,7 +46,7 @@ class TextTable(NamedTuple):
     values: Array
 
     def column(self, text: str, unit: str) -> Array:
-        """A column in SI, ndarray, shape (T,). text: as in the map; unit: of the quantity. Raises InputError."""
+        """A column, ndarray, shape (T,) [SI]. text: as in the map; unit: of the quantity. Raises InputError."""
         match = _CELL.fullmatch(text)
         assert match is not None  # the pattern matches every text of one line
         minus, name, given = match[1], match[2], (match[3] or match[4] or "").strip()

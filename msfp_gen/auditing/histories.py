@@ -33,7 +33,7 @@ class Histories:
 
     Attributes:
         name: of the file or run, for tables and pages.
-        columns: by the names of `QUANTITIES`, ndarray, shape (T,) each, SI; `time` is one of them.
+        columns: by the names of `QUANTITIES`, ndarray, shape (T,) each, [SI]; `time` is one of them.
         mass: supported by all bearings together, as the source states it [kg]; None: it is not stated.
         bearings: number of bearings that share it alike.
 
