@@ -125,7 +125,7 @@ class Sliding:
         return self.stated.coefficients(data.time, speed, travel, data.axial)
 
     def along(self, vectors: Array) -> Array:
-        """Component of horizontal vectors, (T, 2), along the path in the rows, ndarray, shape (k,) [unit of `vectors`]."""
+        """Component of vectors, (T, 2), along the path in the rows, ndarray, shape (k,) [unit of `vectors`]."""
         component: Array = (vectors * self._strokes[0]).sum(axis=1)[self.rows]
         return component
 
