@@ -204,12 +204,18 @@ def percent(values: Iterable[float]) -> str:
 
 
 def scene_table(found: Iterable[Comparison]) -> Iterator[str]:
-    """One row for each scene; those beyond the promise are marked."""
+    """One row for each scene whose floor is at most a tenth of the promise; those beyond the promise are marked."""
     yield f"| scene | modelled | {COLUMNS} | floor |\n" + "|---" * 8 + "|"
+    unknown = []
     for each in found:
+        if not each.floor <= 0.1 * PROMISED:
+            unknown.append(each.name)
+            continue
         mark = "" if each.kept else " **beyond**"
         values = percent((*astuple(each.difference), each.floor))
         yield f"| {each.name}{mark} | {words(each.models)} | {values} |"
+    if unknown:
+        yield f"\nLeft out, since the floor is more than {0.1 * PROMISED:.2%}: {'; '.join(unknown)}"
 
 
 def summary_table(found: Iterable[Comparison]) -> Iterator[str]:
