@@ -13,6 +13,11 @@ from msfp_gen.common.version import __version__
 if TYPE_CHECKING:
     from msfp_gen.auditing import audit as audit
     from msfp_gen.buildings.building import Building as Building
+    from msfp_gen.buildings.figures import plot_axial_forces as plot_axial_forces
+    from msfp_gen.buildings.figures import plot_building as plot_building
+    from msfp_gen.buildings.figures import plot_floor_spectra as plot_floor_spectra
+    from msfp_gen.buildings.figures import plot_plan as plot_plan
+    from msfp_gen.buildings.figures import plot_profile as plot_profile
     from msfp_gen.buildings.result import BuildingResult as BuildingResult
     from msfp_gen.buildings.scene import BuildingBearing as BuildingBearing
     from msfp_gen.buildings.scene import BuildingScene as BuildingScene
@@ -24,14 +29,29 @@ if TYPE_CHECKING:
     from msfp_gen.common.errors import MsfpError as MsfpError
     from msfp_gen.common.errors import RunError as RunError
     from msfp_gen.embedding.two_port import TwoPort as TwoPort
+    from msfp_gen.figures import animate as animate
+    from msfp_gen.figures import figures_of as figures_of
+    from msfp_gen.figures import plot_correction as plot_correction
+    from msfp_gen.figures import plot_energy as plot_energy
+    from msfp_gen.figures import plot_force_path as plot_force_path
+    from msfp_gen.figures import plot_loops as plot_loops
+    from msfp_gen.figures import plot_orbit as plot_orbit
+    from msfp_gen.figures import plot_response_spectrum as plot_response_spectrum
+    from msfp_gen.figures import plot_result as plot_result
+    from msfp_gen.figures import plot_section as plot_section
+    from msfp_gen.figures import plot_sheet as plot_sheet
+    from msfp_gen.figures import plot_sliding as plot_sliding
+    from msfp_gen.figures import plot_stages as plot_stages
     from msfp_gen.model.model import build_model as build_model
     from msfp_gen.model.symbolic import symbolic as symbolic
     from msfp_gen.motions.motion import Motion as Motion
     from msfp_gen.motions.prescribed import Load as Load
     from msfp_gen.motions.prescribed import Rotation as Rotation
+    from msfp_gen.report import write_report as write_report
     from msfp_gen.results.result import Result as Result
     from msfp_gen.results.result import characterise as characterise
     from msfp_gen.results.result import load_result as load_result
+    from msfp_gen.results.sign import using_sign as using_sign
     from msfp_gen.scene.bearing import Bearing as Bearing
     from msfp_gen.scene.bearing import Body as Body
     from msfp_gen.scene.bearing import Surface as Surface
@@ -85,19 +105,39 @@ _MODULES = {
     "Surface": "scene.bearing",
     "Top": "scene.top",
     "TwoPort": "embedding.two_port",
+    "animate": "figures",
     "audit": "auditing",
     "bound": "studies.bounding",
     "build_model": "model.model",
     "changed_scene": "scene.file.source",
     "characterise": "results.result",
+    "figures_of": "figures",
     "fit": "studies.calibration",
     "load_result": "results.result",
     "load_scene": "scene.file.source",
+    "plot_axial_forces": "buildings.figures",
+    "plot_building": "buildings.figures",
+    "plot_correction": "figures",
+    "plot_energy": "figures",
+    "plot_floor_spectra": "buildings.figures",
+    "plot_force_path": "figures",
+    "plot_loops": "figures",
+    "plot_orbit": "figures",
+    "plot_plan": "buildings.figures",
+    "plot_profile": "buildings.figures",
+    "plot_response_spectrum": "figures",
+    "plot_result": "figures",
+    "plot_section": "figures",
+    "plot_sheet": "figures",
+    "plot_sliding": "figures",
+    "plot_stages": "figures",
     "presets": "scene.file.presets",
     "simulate": "simulation.simulate",
     "simulate_batch": "studies.batch",
     "study": "studies.run",
     "symbolic": "model.symbolic",
+    "using_sign": "results.sign",
+    "write_report": "report",
 }
 
 __all__ = [*_MODULES, "__version__"]

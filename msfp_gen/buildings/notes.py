@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -32,7 +32,6 @@ from msfp_gen.scene.standing import unsteady
 from msfp_gen.specification.layout import Auto
 
 ENERGY_LIMIT = 0.02  # error of the energy balance of the building over its largest term, above which a note is written
-GATHERED = ("inertia", "heat", "law_speed", "law_load", "law_temperature")  # kinds with one note for all bearings
 ENERGY = (
     "the energy balance of the building has an error of {value:.1%} of the largest energy: give a smaller "
     "solver.max_step"
@@ -50,7 +49,7 @@ def notes_of(scene: BuildingScene, monitored: Sequence[Note], error: float, time
         for number, (mount, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True), start=1)
         for note in value_notes(mount, load)
     ]
-    notes = [*_shared(values), *_gathered(monitored)]
+    notes = [*shared(values), *_gathered(monitored)]
     labelled = [replace(note, text=f"{scene.label(note.bearing - 1)}: {note.text}") for note in notes]
     whole = [Note(0.0, "value", *doubt) for doubt in building_doubts(scene)]
     whole += [Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity])] if scene.fidelity in UNSEEN else []
@@ -59,7 +58,7 @@ def notes_of(scene: BuildingScene, monitored: Sequence[Note], error: float, time
     return tuple(sorted([*labelled, *whole], key=lambda note: note.time))
 
 
-def _shared(notes: Sequence[Note]) -> list[Note]:
+def shared(notes: Iterable[Note]) -> list[Note]:
     """The notes on values, with one note, of the first bearing, for all that have such a value at the same place."""
     alike: dict[tuple[int, str], list[Note]] = {}
     for note in notes:
@@ -76,14 +75,13 @@ def _with_others(note: Note, alike: Sequence[Note], addition: str = "") -> Note:
 
 
 def _gathered(notes: Sequence[Note]) -> list[Note]:
-    """The notes, with one note for all bearings of each kind in GATHERED, which many bearings have."""
+    """The notes of monitors, with one note of each kind for all bearings whose model did not change."""
     # Of a kind in `RISING` it is the note with the largest value, of another kind the first note.
-    gathered = [note for note in notes if note.kind not in GATHERED]
-    for kind in GATHERED:
+    gathered = [note for note in notes if note.action]
+    for kind in dict.fromkeys(note.kind for note in notes):
         alike = [note for note in notes if note.kind == kind and not note.action]
         alike.sort(key=lambda note: -note.value if note.kind in RISING else note.time)
         gathered += [_with_others(note, alike, ", with less" if kind in RISING else "") for note in alike[:1]]
-        gathered += [note for note in notes if note.kind == kind and note.action]
     return gathered
 
 

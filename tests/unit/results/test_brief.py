@@ -11,6 +11,8 @@ from support import preset_run
 
 import msfp_gen
 from msfp_gen import Load, Result, load_scene, simulate
+from msfp_gen.figures import FIGURES, animate, using_sign
+from msfp_gen.report import write_report
 from msfp_gen.results.note import Note
 
 
@@ -109,6 +111,13 @@ def test_names_that_users_look_for_are_at_the_top() -> None:
     scene = msfp_gen.changed_scene("fenz-test2", {"bearing.friction": [0.05, 0.02, 0.02, 0.1], "duration": 1.0})
     result = simulate(scene)
     assert isinstance(result, Result) and scene.bearing.surfaces[0].friction == 0.05
+
+
+def test_every_figure_of_a_run_and_its_report_are_at_the_top() -> None:
+    """By the tables of figures that the command line reads."""
+    drawn = {*FIGURES.values(), *load_scene("hospital-clc").figures.values(), animate, using_sign, write_report}
+    assert {getattr(msfp_gen, each.__name__) for each in drawn} == drawn
+    assert drawn >= {getattr(msfp_gen, name) for name in ("plot_result", "plot_section", "plot_building")}
 
 
 def test_a_bearing_prints_its_values() -> None:
