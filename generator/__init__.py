@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from msfp_gen.specification.layout import ModelSpec
 
-    from .lower import Kernel
-
 
 @dataclass(frozen=True)
 class Generated:
@@ -44,15 +42,13 @@ def generate(spec: ModelSpec) -> Generated:
     from .derive import derive
     from .drivers import directional_kernels, end_kernels
     from .emit import emit
-    from .lower import directional_programs, lower
+    from .lower import lower
 
     times = [time.perf_counter()]
     equations = derive(spec)
     times.append(time.perf_counter())
     kernels = tuple(lower(program) for program in equations.programs)
-    directional: tuple[Kernel, ...] = ()
-    if spec.gradients:
-        directional = (*directional_kernels(equations), *map(lower, directional_programs(equations.programs)))
+    directional = directional_kernels(equations) if spec.gradients else ()
     by_ends = end_kernels(equations) if spec.effects.permits_moving_ends else ()
     times.append(time.perf_counter())
     files = emit(equations, kernels, directional, by_ends)

@@ -157,15 +157,17 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
     signed_radius, rates = slip(p, friction_model, par, base, shear, N, loc["dw"])
     out = {**rates, **friction(p, friction_model, unknown, base, N, g, loc["dw"], signed_radius)}
     law = friction_model.coefficient
-    out |= laws.law_results(p, law, par, unknown, stage, loc, N, f, g, rates)
+    by_law, slopes = laws.law_results(p, law, par, unknown, stage, loc, N, f, g, rates)
+    out |= by_law
     for name in ("Y", "Z"):
-        out[f"Y{name}"], out[f"Z{name}"] = p.partials((rates["dY"], rates["dZ"]), f[name])
-    values = {**out, **f, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_}
+        slopes[f"Y{name}"], slopes[f"Z{name}"] = p.partials((rates["dY"], rates["dZ"]), f[name])
+    values = {**out, **slopes, **f, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_}
     p.write(
         b.contact,
         {name: values[name] for name in b.contact.quantities},
         tangents=("M", "dY", "dZ", "N") if law is None else ("M", "dY", "dZ", "mu", "N"),
         columns="MSFP_FRAME_INPUTS",
+        slopes=slopes,
     )
     p.lanes = "MSFP_LANES"
     return p

@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from . import two_port as ends
+from msfp_gen.specification.layout import Effects
+
 from .derive import Equations
-from .lower import Kernel, directional, lower
+from .directions import BY_ENDS, BY_PARAMETERS, Directions, directed
+from .lower import Kernel, by_inputs, lower
 from .program import Block, Program
 from .schedule import (
     COLUMNS,
@@ -26,6 +28,8 @@ from .schedule import (
     Solve,
     Values,
     When,
+    at_hand,
+    beside,
     calls_of,
     check,
     condensed,
@@ -38,6 +42,7 @@ from .schedule import (
     two_port,
     unknowns,
 )
+from .two_port import eliminated, end_angles
 
 LOOPS = {
     Over.BODIES: "for (int k = 1; k <= MSFP_NB; ++k)",
@@ -72,7 +77,7 @@ RUNTIME: Mapping[tuple[str, str], tuple[str, tuple[str, ...]]] = {
 }
 """What the runtime does itself: program and form -> its function and what this is given; of `jacobians` where these are
 wanted."""
-BY_ENDS = {"foot": "if (msfp_top_is_sprung(p)) ", "contact": LOOPS[Over.SURFACES] + " "}
+WHERE = {"foot": "if (msfp_top_is_sprung(p)) ", "contact": LOOPS[Over.SURFACES] + " "}
 """What the runtime solves, of which the derivatives by the motion of the ends are a program: where this runs."""
 Programs = Mapping[str, Program]
 
@@ -116,25 +121,34 @@ def scheduled_kernels(equations: Equations) -> tuple[Kernel, ...]:
 
 
 def directional_kernels(equations: Equations) -> tuple[Kernel, ...]:
-    """Directional derivatives of the programs of the condensed equations and of the energies."""
-    return _kernels(equations, {**condensed(equations.spec.effects), **energies(equations.spec.effects)}, directional)
+    """Derivatives by parameters of the programs of the condensed equations, of the energies, and of those beside."""
+    effects = equations.spec.effects
+    contacts = (lower(by_inputs(program)) for program in equations.programs if program.name == "contact")
+    return (
+        *_kernels(equations, {**condensed(effects), **energies(effects), **beside(effects)}, BY_PARAMETERS),
+        *contacts,
+    )
 
 
 def end_kernels(equations: Equations) -> tuple[Kernel, ...]:
     """Derivatives of the programs of the condensed equations and of a two-port by the motion of its ends."""
-    effects = equations.spec.effects
-    scheduled = _kernels(equations, {**condensed(effects), **two_port(effects)}, ends.by_ends)
-    return (*scheduled, *ends.port_kernels(equations.programs))
+    return (
+        *_kernels(equations, with_ends(equations.spec.effects), BY_ENDS),
+        *end_angles(equations.programs, equations.blocks, BY_ENDS),
+    )
 
 
-def _kernels(
-    equations: Equations, schedule: Schedule, differentiate: Callable[[Program, bool], Program]
-) -> tuple[Kernel, ...]:
-    called = _called(schedule)
+def with_ends(effects: Effects) -> Schedule:
+    """The condensed equations after the load of the interface, and the wrenches of the ends."""
+    port = two_port(effects)
+    return {"interface": port["interface"], **condensed(effects), **port}
+
+
+def _kernels(equations: Equations, schedule: Schedule, along: Directions) -> tuple[Kernel, ...]:
+    programs = {program.name: program for program in equations.programs}
+    found = directed(along, schedule, programs, equations.blocks)
     return tuple(
-        lower(differentiate(program, _at_hand(called[program.name])))
-        for program in equations.programs
-        if program.name in called
+        eliminated(found[name]) if name == "contact" else lower(found[name]) for name in programs if name in found
     )
 
 
@@ -169,11 +183,9 @@ def schedule_context(equations: Equations, directional: Iterable[Kernel], by_end
     directed = _lists(with_directions)
     used = {name: None for name in LISTS if name in directed or name in _lists(balances) or name in _lists(port)}
     forms = {
-        "directions": _form("directions", "_direction", with_directions, directional),
-        "by_ends": _form("by_ends", "_by_ends", of_ends, by_ends),
+        along.name: _form(along.name, f"_{along.suffix}", schedule, kernels)
+        for along, schedule, kernels in ((BY_PARAMETERS, with_directions, directional), (BY_ENDS, of_ends, by_ends))
     }
-    if forms["by_ends"].kernels:
-        check_by_ends(equations, forms["by_ends"].kernels)
     every = {**balances, **with_directions, **port}
     return {
         "parts": [part(name, passes, programs, forms) for name, passes in every.items()],
@@ -197,21 +209,6 @@ def schedule_context(equations: Equations, directional: Iterable[Kernel], by_end
         ],
         "unknowns": unknowns(equations.spec),
     }
-
-
-def check_by_ends(equations: Equations, kernels: Mapping[str, Kernel]) -> None:
-    """As `check`, for the derivatives by the motion of the ends; kernels: by the name of the program."""
-    programs = {
-        program.name: replace(
-            kernels[program.name].program, inputs=kernels[program.name].program.inputs[: len(program.inputs)]
-        )
-        for program in equations.programs
-        if program.name in kernels
-    }
-    effects = equations.spec.effects
-    port = two_port(effects)
-    passes = passes_of({"interface": port["interface"], **condensed(effects), **port})
-    check(passes, programs, equations.blocks, ends.moving(equations.blocks), "by_ends")
 
 
 PLACES = {Over.BASE: "base", Over.BODIES: "body", Over.TOP: "top"}
@@ -263,11 +260,6 @@ def _read_values(schedule: Schedule, kernels: Mapping[str, Kernel]) -> set[str]:
                 if any(f"{use.alias}_{field.name}" in symbols for field in use.block.fields):
                     read.add(place.partition("[")[0])
     return read
-
-
-def _at_hand(call: Call) -> bool:
-    """Whether the work area holds the results of a call while it is differentiated."""
-    return call.by is None and not call.adds and len(call.writes) == 1 and list_of(call.writes[0]).kept is Kept.WORK
 
 
 def part(name: str, passes: Iterable[Pass], programs: Programs, directional: Mapping[str, Form]) -> dict[str, Any]:
@@ -445,7 +437,7 @@ def _of_solved(call: Call, form: Form) -> Iterator[Line]:
         reads = ["s->g[j]" if place == "friction_force[j]" else _in_c(place, "values") for place in call.reads]
         given = [*reads, *_all_in_c(call.writes, "values"), *_moving(call, derivatives, form.name)]
         called = _statement(f"msfp_{derivatives.name}", [*given, *_all_in_c(call.writes, form.name)])
-        when = _line(BY_ENDS[call.program], "p") if call.program == "foot" else Line(BY_ENDS[call.program])
+        when = _line(WHERE[call.program], "p") if call.program == "foot" else Line(WHERE[call.program])
         yield Line(when.text + called.text, when.names | called.names)
 
 
@@ -453,7 +445,7 @@ def _direction(call: Call, program: Program, writes: list[str], with_values: boo
     if with_values:
         yield from _evaluated(call, program)
     derivatives = form.kernels[program.name].program
-    values = _all_in_c(call.writes, "values") if _at_hand(call) else []
+    values = _all_in_c(call.writes, "values") if at_hand(call) else []
     given = [*_all_in_c(call.reads, "values"), *values, *_moving(call, derivatives, form.name)]
     size = f"{_size(program)} * {derivatives.columns}"
     yield from _written(call, f"msfp_{derivatives.name}", given, writes, size)

@@ -243,12 +243,11 @@ def law_results(
     f: Symbols,
     g: Symbols,
     slip: Symbols,
-) -> Symbols:
-    """Results that a law adds to `contact`; empty for constant friction.
+) -> tuple[Symbols, Symbols]:
+    """Results that a law adds to `contact`, and derivatives among them; empty for constant friction.
 
-    They are mu by the law and its derivatives with respect to the friction force over -mu N at constant N and slip
-    velocity. With a memory they include its source, its value and the derivative of the law with respect to the unknown
-    mu.
+    They are mu by the law, with a memory its source and its value; and the derivatives of mu with respect to the
+    friction force over -mu N at constant N and slip velocity, with a memory to the unknown mu too.
 
     Args:
         p: program of the contact.
@@ -263,10 +262,11 @@ def law_results(
         slip: slip velocity with the velocity of plastic slip, of `contact.slip`.
     """
     if law is None:
-        return {}
+        return {}, {}
     c = unknown["law"]
     variables = law_variables(p, law, par, N, slip["plastic"])
     results: Symbols = {}
+    slopes: Symbols = {}
     memory = law.memory
     if memory:
         share = source_of(p, memory, par, variables, loc)
@@ -275,9 +275,10 @@ def law_results(
         variables[memory.variable] = results["memory"] = p.let(value, memory.variable)
     mu = results["mu"] = coefficient(p, law, par, variables)
     if memory:
-        results["law_mu"] = p.partial(mu, c["mu"], constant=(N, slip["u"], slip["v"]))
+        slopes["law_mu"] = p.partial(mu, c["mu"], constant=(N, slip["u"], slip["v"]))
     slope = p.let(p.partial(mu, slip["plastic"]) * p.partial(f["Y"], g["Y"]))
-    return results | {f"law_{name}": p.let(slope * p.partial(slip["plastic"], f[name])) for name in ("Y", "Z")}
+    slopes |= {f"law_{name}": p.let(slope * p.partial(slip["plastic"], f[name])) for name in ("Y", "Z")}
+    return results, slopes
 
 
 def evaluate_law(

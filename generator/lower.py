@@ -1,14 +1,12 @@
 """Lowering: reduces a program to the statements that it needs and differentiates it statement by statement.
 
-Gradients differentiate a run with respect to parameters. Where the tangent of a step keeps the parameters constant, the
-directional programs carry the derivative of every input: radii, masses and friction as well as angles and rates. They
-are the programs of `derive.py`, with other inputs active; nothing is derived again. Only models with `gradients` have
-them.
+A directional derivative is that of a program of `derive.py` with other inputs active and other results differentiated;
+nothing is derived again. `directions.py` finds which these are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -72,6 +70,31 @@ def needed_statements(statements: Sequence[Statement], symbols: set[sp.Symbol]) 
             backwards.append(statement)
             needed |= statement.expression.free_symbols
     return tuple(reversed(backwards))
+
+
+def symbol_of(use: Use, field: str) -> sp.Symbol:
+    """The symbol of a stored field of an input."""
+    return sp.Symbol(f"{use.alias}_{field}", real=True)
+
+
+def moving_symbols(program: Program, sources: set[sp.Symbol]) -> set[sp.Symbol]:
+    """The symbols of a program with a derivative by any of the sources, these included."""
+    moving = set(sources)
+    for statement in program.statements:
+        if any(derivative(statement.expression, s) != 0 for s in statement.expression.free_symbols & moving):
+            moving.add(statement.target)
+    return moving
+
+
+def symbols_read(program: Program, results: Iterable[str], sources: set[sp.Symbol]) -> set[sp.Symbol]:
+    """The sources whose derivatives those of the results contain."""
+    moving = moving_symbols(program, sources)
+    needed = {s for name in results for s in program.results[name].free_symbols & moving}
+    for statement in reversed(program.statements):
+        if statement.target in needed:
+            terms = statement.expression.free_symbols & moving
+            needed |= {s for s in terms if derivative(statement.expression, s) != 0}
+    return needed & sources
 
 
 def active_inputs(program: Program) -> set[sp.Symbol]:
@@ -175,43 +198,20 @@ def needed_tangents(
 
 GRADIENT_COLUMNS = 4
 """Parameters whose derivatives one call carries: as many numbers as the vectors of most processors hold."""
-CONTACT_RESULTS = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "drill", "mu", "source", "memory")
-"""Results of `contact`, beside its moment, whose derivatives are used."""
-CONTACT_INPUTS = ("par", "h", "loc", "g", "c")
-"""Inputs of `contact`: parameters, stage formula, force and slip rotation; and what its local equations determine,
-friction and the coefficient of a friction law."""
-DIFFERENTIATED = {
-    "body_block": False,
-    "surface_block": False,
-    "top_block": False,
-    "upright": False,
-    "spring_stage": False,
-    "resting_foot": False,
-    "foot": True,
-    "gap": True,
-    "friction_after_slip": False,
-    "slip_work": False,
-}
-"""Programs that gradients differentiate beside those of their schedules (`drivers.directional_kernels`), and whether
-the block of their results is at hand where this is done."""
 
 
-def _with_all_inputs(use: Use) -> Use:
-    return replace(use, active=frozenset(field.name for field in use.block.fields), moving=True)
-
-
-def directional(program: Program, output_is_stored: bool) -> Program:
-    """The program with all inputs active and every result differentiated; output_is_stored: as of `differentiated`."""
-    inputs = [_with_all_inputs(use) for use in program.inputs]
-    return differentiated(program, "direction", inputs, frozenset(program.results), "MSFP_COLUMNS", output_is_stored)
-
-
-def differentiated(
-    program: Program, name: str, inputs: list[Use], tangents: frozenset[str], columns: str, output_is_stored: bool
+def directional(
+    program: Program, suffix: str, columns: str, inputs: list[Use], results: frozenset[str], output_is_stored: bool
 ) -> Program:
-    """The derivatives of a program, as one of another name, with other inputs active and other results differentiated.
+    """The derivatives of a program along directions, as one of another name.
 
-    output_is_stored: the results themselves are read, as a block `out`, where the derivatives contain them.
+    Args:
+        program: the program.
+        suffix: what its name ends with.
+        columns: C constant with the number of directions.
+        inputs: its inputs, with what moves along them as active.
+        results: what is differentiated.
+        output_is_stored: the results themselves are read, as a block `out`, where the derivatives contain them.
     """
     assert program.output is not None
     names: dict[sp.Expr, sp.Expr] = {}
@@ -223,15 +223,22 @@ def differentiated(
                 names.setdefault(result, sp.Symbol(f"{program.output.alias}_{field}", real=True))
     return replace(
         program,
-        name=f"{program.name}_{name}",
+        name=f"{program.name}_{suffix}",
         inputs=inputs,
         statements=[Statement(s.target.xreplace(names), s.expression.xreplace(names)) for s in program.statements],
         results={field: result.xreplace(names) for field, result in program.results.items()},
-        tangents=tangents,
+        tangents=results,
         columns=columns,
         lanes="",
         stored=False,
     )
+
+
+def with_all_inputs(program: Program) -> list[Use]:
+    """The inputs of a program, all of which move."""
+    return [
+        replace(use, active=frozenset(field.name for field in use.block.fields), moving=True) for use in program.inputs
+    ]
 
 
 def by_inputs(program: Program) -> Program:
@@ -240,12 +247,9 @@ def by_inputs(program: Program) -> Program:
 
     def used(use: Use) -> Use:
         names = {f.name for f in use.block.fields if use.alias in ("h", "loc") or f"{use.alias}_{f.name}" in symbols}
-        if use.alias == "c":
-            names &= {"mu"}
         return replace(use, active=frozenset(names - {"sign"}), moving=True)
 
-    assert tuple(use.alias for use in program.inputs) in (CONTACT_INPUTS[:4], (*CONTACT_INPUTS[:4], "c"))
-    results = frozenset(name for name in program.results if name in CONTACT_RESULTS or name.startswith("M"))
+    results = frozenset(program.results) - program.slopes
     return replace(program, name="contact_by_inputs", inputs=[used(use) for use in program.inputs], tangents=results)
 
 
@@ -254,18 +258,10 @@ def contact_lists(programs: Iterable[Program]) -> dict[str, object]:
     for program in programs:
         if not program.lanes or program.output is None:
             continue
-        uses = [(CONTACT_INPUTS.index(use.alias), use) for use in program.inputs]
+        numbered = [(i, use, j, f) for i, use in enumerate(program.inputs) for j, f in enumerate(use.block.fields)]
+        fields = enumerate(program.output.block.fields)
         return {
-            "inputs": [(i, j) for i, use in uses for j, f in enumerate(use.block.fields) if f.name in use.active],
-            "results": [j for j, f in enumerate(program.output.block.fields) if f.name in program.tangents],
+            "inputs": [(i, j) for i, use, j, field in numbered if field.name in use.active],
+            "results": [j for j, field in fields if field.name in program.tangents],
         }
     return {}
-
-
-def directional_programs(programs: tuple[Program, ...]) -> Iterator[Program]:
-    """The directional derivatives that a model with gradients uses beside those of its schedules."""
-    for program in programs:
-        if program.name in DIFFERENTIATED:
-            yield directional(program, DIFFERENTIATED[program.name])
-        if program.name == "contact":
-            yield by_inputs(program)

@@ -154,6 +154,8 @@ class Program:
     """Stored field of the output -> its value, a symbol or a constant."""
     tangents: frozenset[str] = frozenset()
     """Stored fields of the output whose tangent is emitted; empty for a program without a tangent."""
+    slopes: frozenset[str] = frozenset()
+    """Stored fields of the output that are derivatives themselves, of which no derivatives are taken."""
     columns: str = ""
     """C constant with the number of columns of the tangent."""
     lanes: str = ""
@@ -251,6 +253,7 @@ class Program:
         tangents: bool | Iterable[str] = True,
         columns: str = "MSFP_DOF",
         alias: str = "out",
+        slopes: Iterable[str] = (),
     ) -> None:
         """Declare the output block and its values.
 
@@ -260,6 +263,7 @@ class Program:
             tangents: quantities whose tangent is emitted; True: all, False: none.
             columns: C constant with the number of columns of the tangent.
             alias: prefix of the output in emitted code and LaTeX.
+            slopes: quantities that are derivatives themselves.
 
         Raises:
             AssertionError: a value contradicts a constant component of the block, or is not in the block.
@@ -283,6 +287,7 @@ class Program:
         self.tangents = frozenset(
             names if tangents is True else [] if tangents is False else fields_of(block, tangents)
         )
+        self.slopes = frozenset(fields_of(block, slopes))
         self.columns = columns if self.tangents else ""
 
 

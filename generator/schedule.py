@@ -19,7 +19,7 @@ from msfp_gen.specification.layout import Effects, ModelSpec
 
 from .blocks import Blocks
 from .lower import needed_statements
-from .program import Block, Field, Program
+from .program import Block, Program
 
 COLUMNS = "MSFP_DOF"
 """C constant with the number of variables whose derivatives one call carries."""
@@ -75,10 +75,16 @@ class Solve:
 
     Attributes:
         forms: the forms of derivatives (`drivers.py`) that there are: "tangents", "directions", "by_ends".
+        emitted: the forms of which the derivatives are a program, which is emitted.
+        reads: results of which the runtime reads the derivatives, beside those that other programs read.
+        given: whether it gives the results where it asks for the derivatives.
         fails: whether it may find no solution, with a status at which the evaluation ends.
     """
 
     forms: frozenset[str]
+    emitted: frozenset[str] = frozenset()
+    reads: tuple[str, ...] = ()
+    given: bool = False
     fails: bool = False
 
 
@@ -209,6 +215,9 @@ LISTS: Mapping[str, List] = {
     "lower": List("end_wrench", "lower"),
     "upper": List("end_wrench", "upper"),
     "gap": List("gap", "gap", per=Per.SURFACE),
+    "resting_foot": List("resting_foot", "resting_foot"),
+    "friction_end": List("friction_end", "friction_end", per=Per.SURFACE),
+    "slip_work": List("slip_work", "slip_work", per=Per.SURFACE),
 }
 """All lists of blocks."""
 
@@ -264,7 +273,7 @@ def _top(effects: Effects) -> Pass:
                 "foot",
                 ("top_parameters", "body[top]", "foot_stage"),
                 ("foot",),
-                Solve(frozenset({"directions", "by_ends"})),
+                Solve(frozenset({"directions", "by_ends"}), frozenset({"directions", "by_ends"}), given=True),
             ),
         ),
     )
@@ -382,7 +391,8 @@ def condensed(effects: Effects) -> Schedule:
     rim, uplift = ("rim[j]",) if effects.rims else (), effects.uplift
     law = ("coefficient[j]",) if effects.law is not None else ()
     summed = Call("interface_force", ("body_parameters[j+1]", "body[j+1]", "force[j+1]"), ("force[j]",))
-    contact = Solve(frozenset({"tangents", "directions", "by_ends"}), fails=True)
+    forms, by_ends = frozenset({"tangents", "directions", "by_ends"}), frozenset({"by_ends"})
+    contact = Solve(forms, by_ends, reads=("dY", "dZ", "mu", "N", "source"), given=True, fails=True)
     moments = (
         Call("surface_moment", ("contact[j]", *rim), ("local_moment[j]",)),
         Call("moment_to_world", ("body[j]", "local_moment[j]"), ("joint_moment[j]" if uplift else "moment[j]",)),
@@ -500,9 +510,56 @@ def two_port(effects: Effects) -> Schedule:
     }
 
 
+def beside(effects: Effects) -> Schedule:
+    """What the runtime calls itself, before, between and after evaluations, and differentiates by parameters."""
+    by = Solve(frozenset({"directions"}), frozenset({"directions"}))
+    slip = (
+        Call("friction_after_slip", ("surface_parameters[j]", "slip[j]", "contact_frame[j]"), ("friction_end[j]",), by),
+        Call("slip_work", ("surface_parameters[j]", "slip[j]", "slip_end[j]"), ("slip_work[j]",), by),
+    )
+    surface = ("surface_values[j]", "body_values[slider]", "side[j]")
+    support = (Call("upright", ("support",), ("upright",), by),) if effects.top_rotation else ()
+    return {
+        "parameters": (
+            Pass(Over.BODIES, (Call("body_block", ("body_values[k]", "sides[k]"), ("body_parameters[k]",), by),)),
+            Pass(Over.SURFACES, (Call("surface_block", surface, ("surface_parameters[j]",), by),)),
+            Pass(Over.TOP, (Call("top_block", ("top_values", "around"), ("top_parameters",), by),)),
+        ),
+        "stage": (
+            Pass(
+                Over.TOP,
+                (
+                    *support,
+                    Call("spring_stage", ("top_parameters", "foot_previous"), ("foot_stage",), by),
+                    Call("resting_foot", ("top_parameters", "body[top]"), ("resting_foot",), by),
+                ),
+            ),
+            *((Pass(Over.SURFACES, slip),) if effects.permits_quasistatic_steps else ()),
+        ),
+        "gaps": (
+            Pass(
+                Over.SURFACES,
+                (Call("gap", ("surface_parameters[j]", "body[j+1]"), ("gap[j]",), replace(by, given=True)),),
+            ),
+        ),
+    }
+
+
+def list_name(place: str) -> str:
+    """The name of the list of a place."""
+    return place.partition("[")[0]
+
+
 def list_of(place: str) -> List:
     """The list of a place."""
-    return LISTS[place.partition("[")[0]]
+    return LISTS[list_name(place)]
+
+
+def at_hand(call: Call) -> bool:
+    """Whether the work area holds the results of a call while it is differentiated."""
+    if isinstance(call.by, Solve):
+        return call.by.given
+    return call.by is None and not call.adds and len(call.writes) == 1 and list_of(call.writes[0]).kept is Kept.WORK
 
 
 def index_of(place: str) -> str:
@@ -559,40 +616,36 @@ def tangent_of(program: Program) -> Program:
     return replace(program, name=f"{program.name}_columns", columns=COLUMNS)
 
 
-def check(
-    passes: Iterable[Pass],
-    programs: Mapping[str, Program],
-    blocks: Blocks,
-    moving_fields: Iterable[tuple[str, str]] | None = None,
-    form: str = "tangents",
-) -> set[str]:
+def check(passes: Iterable[Pass], programs: Mapping[str, Program], blocks: Blocks) -> set[str]:
     """Raise AssertionError where a place does not fit its program, or a derivative would be lost or is not there.
 
-    Every derivative that a call reads must have been written by an earlier one, or be given: (list, field), those of
-    `VARIABLES` where it is None. A call must not take for constant what has derivatives. Of what the runtime
-    differentiates itself in this form only the places are checked.
+    Every derivative by the variables of a step that a call reads must have been written by an earlier one, or be one of
+    `VARIABLES`. A call must not take for constant what has derivatives. Of what the runtime differentiates itself only
+    the places are checked.
 
     Returns:
         The lists that have derivatives.
     """
-    variables = (
-        (name, field.name) for parts in VARIABLES.values() for name, _ in parts for field in _block(name, blocks)
-    )
-    moving = set(variables if moving_fields is None else moving_fields)
+    moving = {
+        (name, field.name)
+        for parts in VARIABLES.values()
+        for name, _ in parts
+        for field in block_of(name, blocks).fields
+    }
     every = ((call, programs[name]) for call in calls_of(passes) for name in call.programs)
     for call, program in every:
         assert program.output is not None
         assert len(call.reads) == len(program.inputs), call
-        assert not isinstance(call.by, Solve) or form in call.by.forms or not program.tangents, call
+        assert not isinstance(call.by, Solve) or "tangents" in call.by.forms or not program.tangents, call
         needed = set() if isinstance(call.by, Solve) else _differentiated(program)
         for place, use in zip(call.reads, program.inputs, strict=True):
-            assert getattr(blocks, list_of(place).kind) == use.block, (call, place)
-            known = {field for name, field in moving if name == place.partition("[")[0]}
+            assert block_of(place, blocks) == use.block, (call, place)
+            known = {field for name, field in moving if name == list_name(place)}
             reads = {field.name for field in use.block.fields if f"{use.alias}_{field.name}" in needed}
             lost = reads & known - use.active
             missing = reads & use.active - known
             assert not lost and not missing, (call, place, lost, missing)
-        written = [(place.partition("[")[0], field.name) for place in call.writes for field in _block(place, blocks)]
+        written = [(list_name(place), field.name) for place in call.writes for field in block_of(place, blocks).fields]
         assert len(written) == len(program.output.block.fields), call
         for entry, field in zip(written, program.output.block.fields, strict=True):
             if field.name in program.tangents:
@@ -600,9 +653,10 @@ def check(
     return {name for name, _ in moving}
 
 
-def _block(place: str, blocks: Blocks) -> tuple[Field, ...]:
+def block_of(place: str, blocks: Blocks) -> Block:
+    """The block of a place."""
     block: Block = getattr(blocks, list_of(place).kind)
-    return block.fields
+    return block
 
 
 def _differentiated(program: Program) -> set[str]:

@@ -1,21 +1,30 @@
 """Programs of a bearing between two moving ends: load of the interface, wrenches of the ends, and derivatives by them.
 
 End A holds the base, end B the far side of the interface, springs and dampers on the top plate (docs/embedding.md).
-Derivatives by the motion of the ends are those of the programs of the schedule with all inputs active but parameters.
 `rotation_angles` gives the three angles of a plate from the rotation vector of an end.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import sympy as sp
 
 from .blocks import Blocks
+from .directions import Directions
 from .functions import ArcTan2, Stumpff
-from .lower import Kernel, Tangent, active_inputs, differentiated, jacobian_column, lower, values_of_tangents
-from .program import ZERO, Block, Program, Statement, Symbols, Use, add, cross, dot, fields_of, scale, subtract
+from .lower import (
+    Kernel,
+    Tangent,
+    active_inputs,
+    directional,
+    jacobian_column,
+    lower,
+    values_of_tangents,
+    with_all_inputs,
+)
+from .program import ZERO, Program, Statement, Symbols, add, cross, dot, scale, subtract
 
 
 def _angle(p: Program, sine: sp.Expr, cosine: sp.Expr) -> sp.Expr:
@@ -53,23 +62,6 @@ def rotation_angles(b: Blocks) -> Program:
     second = {f"{name[:-1]}2": p.rate(rate) for name, rate in rates.items()}
     p.write(b.rotation_angles, {**angles, **rates, **second}, tangents=False)
     return p
-
-
-WIDTH = "MSFP_PORT_FREEDOMS"
-"""C constant with the number of columns: the freedoms of both ends."""
-FIXED: Mapping[str, tuple[str, ...]] = {
-    "foot_stage": ("beta", "mobility", "share"),
-    "friction_previous": ("beta", "gain"),
-    "friction_stage": ("tau", "rest", "gain"),
-    "far_end": ("a", "rest", "axial"),
-    "body": ("vc", "rc"),
-}
-"""Block -> quantities that the motion of the ends does not change, since a step has a given length, or that no program
-here reads. All others of a block are differentiated, also those of a new field."""
-CONTACT = ("M", "dY", "dZ", "mu", "N", "source")
-"""Results of `contact` on which anything depends."""
-SUPPORT = frozenset({"psi", "theta", "psi1", "theta1"})
-"""Results of `rotation_angles` on which a stage depends at the upper end."""
 
 
 def interface_load(b: Blocks) -> Program:
@@ -130,52 +122,15 @@ def programs(b: Blocks) -> list[Program]:
     return [rotation_angles(b), interface_load(b), locking_moment(b), lower_wrench(b), upper_wrench(b)]
 
 
-def _moves(use: Use) -> Use:
-    """An input with what moves with the ends as active: of a program with a tangent what is active there."""
-    if use.moving or use.block.name.endswith("_parameters"):
-        return use
-    return replace(use, active=frozenset(fields_of(use.block, _moving_of(use.block))), moving=True)
-
-
-def _moving_of(block: Block) -> list[str]:
-    """The quantities of a block that move with the ends."""
-    return [name for name in block.quantities if name not in FIXED.get(block.name, ())]
-
-
-def moving(blocks: Blocks) -> Iterator[tuple[str, str]]:
-    """The fields that the motion of an end changes before an evaluation, as (list, field) of the schedule."""
-    lists = {"x": blocks.coordinates, "frame": blocks.body, "load_moment": blocks.moment, "support": blocks.support}
-    lists |= {
-        "lock": blocks.lock,
-        "far_end": blocks.far_end,
-        "foot_stage": blocks.foot_stage,
-        "friction_previous": blocks.friction_previous,
-    }
-    for name, block in lists.items():
-        yield from ((name, field) for field in fields_of(block, _moving_of(block)))
-
-
-def by_ends(program: Program, output_is_stored: bool) -> Program:
-    """The derivatives of a program by the motion of the ends; output_is_stored: as of `lower.differentiated`."""
-    results = program.tangents or frozenset(program.results)
-    if program.name == "contact":
-        assert program.output is not None
-        names = [name for name in CONTACT if name in program.output.block.quantities]
-        results = frozenset(fields_of(program.output.block, names))
-    return differentiated(program, "by_ends", [_moves(use) for use in program.inputs], results, WIDTH, output_is_stored)
-
-
-def port_kernels(every: Iterable[Program]) -> Iterator[Kernel]:
-    """The derivatives of the programs that C calls itself."""
+def end_angles(every: Iterable[Program], b: Blocks, along: Directions) -> Iterator[Kernel]:
+    """The derivatives of `rotation_angles`: of all results, and of those on which a stage depends at the upper end."""
     for program in every:
-        if program.name == "contact":
-            yield eliminated(by_ends(program, output_is_stored=True))
-        elif program.name == "foot":
-            yield lower(by_ends(program, output_is_stored=True))
-        elif program.name == "rotation_angles":
-            every_angle = by_ends(program, output_is_stored=False)
-            yield lower(every_angle)
-            yield lower(replace(every_angle, name="support_angles_by_ends", tangents=SUPPORT))
+        if program.name == "rotation_angles":
+            inputs, results = with_all_inputs(program), frozenset(program.results)
+            support = results & {field.name for field in b.support.fields}
+            found = directional(program, along.suffix, along.columns, inputs, results, False)
+            yield lower(found)
+            yield lower(replace(found, name=f"support_angles_{along.suffix}", tangents=support))
 
 
 def _local_equations(program: Program) -> Iterator[tuple[sp.Symbol, str, sp.Expr, sp.Symbol | None]]:

@@ -67,6 +67,7 @@ CHOSEN: dict[str, tuple[str, ...]] = {
     "generator/unilateral.py": ("tests/physics/test_uplift.py",),
     "generator/top*.py": (EQUATIONS, "tests/physics/test_vertical_compliance.py"),
     "generator/lower.py": (EQUATIONS, "tests/physics/test_gradients.py", "tests/physics/test_tangents.py"),
+    "generator/directions.py": ("tests/unit/generator", "tests/unit/embedding/test_two_port.py"),
     "generator/columns.py": (EQUATIONS, "tests/physics/test_gradients.py", "tests/physics/test_tangents.py"),
     "generator/schedule.py": (EQUATIONS, "tests/unit/generator"),
     "generator/drivers.py": (EQUATIONS, "tests/unit/generator", "tests/physics/test_gradients.py"),

@@ -16,7 +16,8 @@ from support import Array
 from msfp_gen import Effects, Layout
 from msfp_gen.generator import generate
 from msfp_gen.generator.derive import Equations, derive
-from msfp_gen.generator.lower import DIFFERENTIATED, GRADIENT_COLUMNS
+from msfp_gen.generator.lower import GRADIENT_COLUMNS
+from msfp_gen.generator.schedule import at_hand, beside, calls_of, passes_of
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.specification.layout import ModelSpec
@@ -35,11 +36,12 @@ class Kernels:
         assert set(self.programs) == set(names)
         header = "msfp_gradient_kernels.h" if spec.gradients else "msfp_kernels.h"
         source = f'#include "{header}"\n'
+        alone = {call.program: call for call in calls_of(passes_of(beside(spec.effects)))}
         for program in self.programs.values():
             blocks = [use.alias for use in program.inputs]
             source += self._wrapped(program.name, [*blocks, "out"])
-            if spec.gradients and program.name in DIFFERENTIATED:
-                output_is_stored = ["out"] if DIFFERENTIATED[program.name] else []
+            if spec.gradients and program.name in alone:
+                output_is_stored = ["out"] if at_hand(alone[program.name]) else []
                 moved = [*blocks, *output_is_stored, *(f"d{name}" for name in [*blocks, *output_is_stored]), "dout"]
                 source += self._wrapped(f"{program.name}_direction", moved)
         for name, content in (runtime_sources(spec) | generate(spec).files | {"kernels.c": source}).items():

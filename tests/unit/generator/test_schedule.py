@@ -10,9 +10,10 @@ from dataclasses import replace
 import pytest
 
 from msfp_gen import Effects, Layout
-from msfp_gen.generator import drivers, lower, two_port
+from msfp_gen.generator import directions, drivers
 from msfp_gen.generator import schedule as schedules
 from msfp_gen.generator.derive import Equations, derive
+from msfp_gen.generator.program import Program
 from msfp_gen.generator.schedule import (
     Call,
     Pass,
@@ -139,11 +140,29 @@ def test_arguments_that_a_driver_does_not_name_are_marked() -> None:
             assert printed["unused"][form] == [a for a in ("p", "dp", "w", "d", "s", "ds") if a not in named], name
 
 
-def test_names_kept_by_hand_are_those_of_blocks():
+@pytest.mark.parametrize("effects", [one | {"top_rotation": True, "spin": "locked"} for one in EFFECTS[3:5]], ids=str)
+def test_names_kept_by_hand_are_those_of_blocks(effects: dict[str, object]) -> None:
     """A field that was renamed would be left out of derivatives in silence."""
-    effects = Effects(spin="free", friction="pvt", uplift=True, top_rotation=True)
-    blocks = derive(ModelSpec(Layout.tfp(), effects)).blocks
-    for name, quantities in two_port.FIXED.items():
-        assert set(quantities) <= set(getattr(blocks, name).quantities), name
-    assert set(two_port.CONTACT) <= set(blocks.contact.quantities)
-    assert set(lower.CONTACT_RESULTS) <= {field.name for field in blocks.contact.fields}
+    blocks = equations_of(**effects).blocks
+    for name, quantities in directions.ENDS.items():
+        known = schedules.block_of(name, blocks) if name != "coefficient" or blocks.coefficient else blocks.contact
+        assert set(quantities) - {"past"} <= set(known.quantities), name
+
+
+def test_what_moves_with_the_ends_and_is_read_is_found_from_the_schedule() -> None:
+    """The length of a step is given, so constants of its formulas stay; nothing reads accelerations without mass."""
+
+    def derivatives(**effects: object) -> dict[str, Program]:
+        equations = equations_of(top_rotation=True, **effects)
+        programs = {program.name: program for program in equations.programs}
+        schedule = drivers.with_ends(equations.spec.effects)
+        return directions.directed(directions.BY_ENDS, schedule, programs, equations.blocks)
+
+    full, massless, heated = derivatives(), derivatives(sliders="massless"), derivatives(friction="pvt")
+    assert full["contact_stage"].tangents == {"Y", "Z"}
+    assert heated["contact_stage"].tangents == {"Y", "Z", "past"}
+    assert full["contact"].tangents == {"Mx", "My", "Mz", "dY", "dZ", "N"}
+    assert heated["contact"].tangents == full["contact"].tangents | {"mu", "source"}
+    assert {"acx", "acy", "acz"} == full["forward"].tangents - massless["forward"].tangents
+    assert not {"rcx", "vcx"} & full["forward"].tangents
+    assert not any(use.active for use in full["top_wrench"].inputs if use.block.name.endswith("_parameters"))
