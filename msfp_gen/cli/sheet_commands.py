@@ -17,6 +17,10 @@ SheetFile = Annotated[
     Path, typer.Argument(metavar="FILE", help="A scene file (TOML), or one with [bearing] sheet alone.")
 ]
 
+OfBuilding = Annotated[
+    str | None,
+    typer.Option("--bearing", metavar="NAME", help="Of a building with several sheets: which of [bearings]."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else.")]
 
 
@@ -35,6 +39,7 @@ def sheet(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE", help="Draw it: a .png, .svg or .pdf.")
     ] = None,
+    bearing: OfBuilding = None,
     as_json: AsJson = False,
 ) -> None:
     """State what follows from the data sheet of a bearing: geometry, masses, backbone, effective properties."""
@@ -50,8 +55,7 @@ def sheet(
             wanted.append(Quantity("m", above=0.0).parse(text, text=True))
         except ValueError as error:
             raise InputError(f"--displacement = {text!r}: {error}") from None
-    name, data, bearing = load_sheet(file)
-    report = SheetReport(name, data, bearing, wanted)
+    report = SheetReport(*load_sheet(file, bearing), wanted)
     answer(report.as_dict(), report.tables, as_json)
     if output is not None:
         from msfp_gen.figures import plot_sheet
@@ -82,6 +86,7 @@ def equivalent(
     history: Annotated[
         Path | None, typer.Option(metavar="RESULT.nc", help="A run, whose peaks are compared with the procedure.")
     ] = None,
+    bearing: OfBuilding = None,
     as_json: AsJson = False,
 ) -> None:
     """Equivalent lateral procedure: displacement and base shear from a spectrum, at each bound of friction."""
@@ -92,7 +97,7 @@ def equivalent(
 
     pairs, (factor, rule) = read_spectrum(spectrum), procedure.damping_of(damping)
     arms = None if torsion is None else _lengths(torsion)
-    report = SheetReport(*load_sheet(file))
+    report = SheetReport(*load_sheet(file, bearing))
     gravity = report.bearing.gravity
     found = {case: procedure.equivalent(b, pairs, factor, gravity) for case, b in report.backbones.items()}
     peaks = None if history is None else _peaks(history)

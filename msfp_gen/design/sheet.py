@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import isclose
 from typing import Any
 
 from msfp_gen.common.tables import Table
@@ -17,7 +18,7 @@ from msfp_gen.scene.sheet import Sheet
 CASES = {"lower": "friction_lower", "nominal": "friction", "upper": "friction_upper"}
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of the displacement capacity, where effective properties are given
 # Ends of the regimes of a triple pendulum, by the names of Fenz and Constantinou (2008).
-NAMES = ("u*", "u**", "u_dr1", "u_dr4")
+NAMES = {5: ("u*", "u**", "u_dr1", "u_dr4"), 3: ("u* = u**", "u_dr1 = u_dr4")}  # three: of a symmetric stack
 
 
 @dataclass(frozen=True)
@@ -96,10 +97,11 @@ class SheetReport:
         rows, load = [], self.sheet.axial_load
         for case, backbone in self.backbones.items():
             drawn = regimes(backbone)
+            in_order = isclose(drawn[0][3], drawn[-1][3])  # the inner slider slides first and last
+            names = NAMES.get(len(drawn)) if self.sheet.device == "triple" and in_order else None
             for index, (start, end, force, slope) in enumerate(drawn):
                 last = index == len(drawn) - 1
-                named = self.sheet.device == "triple" and len(drawn) == len(NAMES) + 1
-                word = "capacity" if last else NAMES[index] if named else ""
+                word = "capacity" if last else names[index] if names else ""
                 ends = force + slope * (end - start)
                 stiffness = f"{slope * load / 1e6:.4g}"
                 cells = (f"{start * 1e3:.4g}", f"{end * 1e3:.4g}", word, f"{force:.4f}", f"{ends:.4f}", stiffness)

@@ -79,6 +79,7 @@ class Sheet:
         if self.device != "single":
             self._check_inner()
             self._check_nesting()
+            self._check_dishes()
 
     @property
     def surfaces(self) -> int:
@@ -157,6 +158,21 @@ class Sheet:
             if any(outer <= inner for inner, outer in pairwise((0.0, *side))):
                 raise InputError(
                     f"sheet.height = {self.height} [m]: each surface is farther from the pivot than the one inside"
+                )
+
+    def _check_dishes(self) -> None:
+        """Raise InputError where two dishes that face each other would meet at rest."""
+        assert self.radius and self.height and self.dish_diameter
+        for lower in range(self.surfaces // 2):
+            upper = self.surfaces - 1 - lower
+            edge = min(self.dish_diameter[lower], self.dish_diameter[upper]) / 2
+            deep = sum(_sagitta(self.radius[index], edge) for index in (lower, upper))
+            apart = self.height[lower] + self.height[upper]
+            if deep >= apart:
+                raise InputError(
+                    f"sheet.dish_diameter = {2 * edge:g} [m]: the dishes of surfaces {lower + 1} and {upper + 1} are "
+                    f"{apart:.4g} m apart on their axis and {deep:.4g} m deep together: they would meet; give smaller "
+                    "dishes or a greater height"
                 )
 
     @property

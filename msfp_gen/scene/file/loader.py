@@ -131,19 +131,29 @@ def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
     return _bearing(schema.validate_part("bearing", table))
 
 
-def load_sheet(source: str | Path) -> tuple[str, Sheet, Bearing]:
-    """Name, data sheet and bearing of a TOML file with `[bearing] sheet`, of a scene or alone. Raises InputError."""
+def load_sheet(source: str | Path, kind: str | None = None) -> tuple[str, Sheet, Bearing]:
+    """Name, data sheet and bearing of a TOML file, of a scene or alone, with `[bearing.sheet]` or those of a building.
+
+    kind: name of a table of `[bearings]`; None: the file has one sheet. Raises InputError.
+    """
     path = Path(source)
     with prefixed(f"{path}: "):
         if not is_input(path):
             raise InputError("no such file; give a TOML file with [bearing.sheet]")
         table = toml_file(path)
-        bearing = table.get("bearing")
-        if not isinstance(bearing, dict) or "sheet" not in bearing:
+        of_building = table.get("bearings")
+        kinds = {"": table.get("bearing"), **(of_building if isinstance(of_building, dict) else {})}
+        found = {name: one for name, one in kinds.items() if isinstance(one, dict) and "sheet" in one}
+        if not found:
             raise InputError("bearing.sheet is missing: give the data sheet of the bearing (docs/sheet.md)")
-        valid = schema.validate_part("bearing", bearing)
-        name = table.get("name")
-        return name if isinstance(name, str) and name else path.stem, Sheet(**valid["sheet"]), _bearing(valid)
+        if (len(found) > 1) if kind is None else (kind not in found):
+            names = ", ".join(name or "bearing" for name in found)
+            raise InputError(f"--bearing = {kind or ''!r}: the file has the sheets of {names}; give one of these names")
+        chosen = next(iter(found)) if kind is None else kind
+        with errors_at("bearing", f"bearings.{chosen}" if chosen else "bearing"):
+            valid = schema.validate_part("bearing", found[chosen])
+            name = chosen or table.get("name")
+            return name if isinstance(name, str) and name else path.stem, Sheet(**valid["sheet"]), _bearing(valid)
 
 
 def parsed_sheet(table: Mapping[str, Any]) -> Sheet:
