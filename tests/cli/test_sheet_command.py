@@ -61,6 +61,21 @@ def test_draws_the_section_and_the_backbone(file: Path, tmp_path: Path, capsys: 
     assert target.read_text(encoding="utf-8").count("<path") > 30
 
 
+def test_sheets_of_a_building_by_their_names(file: Path, tmp_path: Path, capsys: Capture) -> None:
+    """Of one sheet the name is not needed; of two it is."""
+    one = file.read_text(encoding="utf-8").replace("[bearing.sheet]", "[bearings.corner.sheet]")
+    building = tmp_path / "building.toml"
+    building.write_text(one, encoding="utf-8")
+    assert main(["sheet", str(building)]) == 0
+    alone = capsys.readouterr().out
+    assert alone.startswith("corner: ")
+    building.write_text(one + one.replace(".corner.", ".middle."), encoding="utf-8")
+    assert main(["sheet", str(building), "--bearing", "corner"]) == 0 and capsys.readouterr().out == alone
+    for options in ([], ["--bearing", "edge"]):
+        assert main(["sheet", str(building), *options]) == 2
+        assert "the file has the sheets of corner, middle" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
