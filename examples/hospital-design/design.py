@@ -1,7 +1,7 @@
 """The design of an isolated hospital in one command: hand checks, data sheet, eleven records at three bounds, report.
 
     python examples/hospital-design/design.py            # into the folder hospital-design/ where it is called
-    python examples/hospital-design/design.py --short    # two records of 3 s, to see that everything works
+    python examples/hospital-design/design.py --short    # two records of 5 s, to see that everything works
 
 docs/hospital-design.md describes it, with the report. A run that was interrupted continues with the same command.
 """
@@ -70,10 +70,10 @@ def checks() -> str:
 
 
 def shortened(folder: Path) -> Path:
-    """The suite of `--short`: a recorded motion and an artificial one, 3 s of each."""
+    """The suite of `--short`: a recorded motion and an artificial one, 5 s of each."""
     suite = tomllib.loads((HERE / "suite.toml").read_text(encoding="utf-8"))
     lines = [
-        f'{{ name = "{one["name"]}", {key} = "{one[key]}", duration = "3 s", hold = "0.5 s" }},'
+        f'{{ name = "{one["name"]}", {key} = "{one[key]}", duration = "5 s", hold = "0.5 s" }},'
         for one, key in ((suite["records"][0], "bundled"), (suite["records"][2], "file"))
     ]
     path = folder / "suite.toml"
@@ -91,7 +91,7 @@ def main() -> None:
     """Everything, into one folder."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("hospital-design"), help="folder of all files")
-    parser.add_argument("--short", action="store_true", help="two records of 3 s")
+    parser.add_argument("--short", action="store_true", help="two records of 5 s")
     given = parser.parse_args()
     folder: Path = given.output
     folder.mkdir(parents=True, exist_ok=True)

@@ -75,18 +75,22 @@ def test_arc_of_the_dish_is_the_capacity_of_the_report() -> None:
     assert again.dish_diameter == pytest.approx((0.229, 0.089, 0.089, 0.229))
 
 
-@pytest.mark.parametrize("height", [(0.05, 0.02), (0.15, 0.08)])
+@pytest.mark.parametrize("height", [(0.3, 0.15), (0.35, 0.2)])
 @pytest.mark.parametrize(
-    ("lengths", "limits", "friction"),
+    ("lengths", "limits", "friction", "sliders"),
     [
         # H.-M. Kim and M. C. Constantinou (2023), configuration A: the example of OpenSees' TripleFrictionPendulumX.
-        ((3.7465, 0.3937), (0.5043, 0.0716), (0.04, 0.01, 0.01, 0.08)),
-        # N. Dao (2013): the example that checks OpenSees' TripleFrictionPendulum.
-        ((1.25, 0.36), (0.2, 0.1), (0.052, 0.012, 0.012, 0.14)),
+        ((3.7465, 0.3937), (0.5043, 0.0716), (0.04, 0.01, 0.01, 0.08), (0.711, 0.508)),
+        # N. Dao (2013): the example that checks OpenSees' TripleFrictionPendulum; without diameters.
+        ((1.25, 0.36), (0.2, 0.1), (0.052, 0.012, 0.012, 0.14), (0.30, 0.20)),
     ],
 )
 def test_devices_of_opensees(
-    lengths: tuple[float, float], limits: tuple[float, float], friction: tuple[float, ...], height: tuple[float, float]
+    lengths: tuple[float, float],
+    limits: tuple[float, float],
+    friction: tuple[float, ...],
+    sliders: tuple[float, float],
+    height: tuple[float, float],
 ) -> None:
     """Their effective radii and displacement limits are published, heights are not: nothing here depends on them.
 
@@ -97,7 +101,7 @@ def test_devices_of_opensees(
     backbone = published_backbone(
         Bearing.from_sheet(
             device="triple", effective_radius=lengths, height=height, friction=friction, capacity=arcs,
-            slider_diameter=(0.30, 0.20), axial_load=1e6,
+            slider_diameter=sliders, axial_load=1e6,
         )
     )  # fmt: skip
     (outer, inner), (mu1, mu2, _, mu4) = lengths, friction
@@ -109,6 +113,81 @@ def test_devices_of_opensees(
     assert backbone.capacity == pytest.approx(2 * sum(limits))
     mean = (mu1 + mu4) / 2 - ((mu1 + mu4) / 2 - mu2) * inner / outer
     assert characteristic(backbone) == pytest.approx((mean, 2 * outer))
+
+
+def test_specimen_of_a_hybrid_simulation() -> None:
+    """A. Schellenberg (2013), Building1DOFwithTMD.tcl of OpenFresco: a triple pendulum with all its lengths, in inches.
+
+    Its script states L_1 = 3.0 - 1.65/2, L_2 = 18.64 - 2.94/2, d_1 = (2.60 - 1.75)/2, d_2 = (9.0 - 3.0)/2: the latter
+    half the difference of the diameters, in place of the arc between them.
+    """
+    inch, kip = 0.0254, 4448.22
+    data = Sheet(
+        device="triple", radius=(18.64 * inch, 3.0 * inch), height=(2.94 / 2 * inch, 1.65 / 2 * inch),
+        friction=(0.13, 0.055), slider_diameter=(3.0 * inch, 1.75 * inch), dish_diameter=(9.0 * inch, 2.60 * inch),
+        axial_load=56 * kip,
+    )  # fmt: skip
+    assert data.effective_radius is not None and data.capacity is not None
+    assert np.array(data.effective_radius[:2]) / inch == pytest.approx([17.17, 2.175])
+    arcs = np.array(data.capacity[:2]) / inch
+    assert np.all(arcs > [3.0, 0.425]) and arcs == pytest.approx([3.0, 0.425], rel=0.08)
+    backbone = published_backbone(Bearing.of_values(data.values))
+    first = 2 * (0.13 - 0.055) * 2.175 * inch
+    assert regimes(backbone)[1][0] == pytest.approx(first)
+    assert characteristic(backbone) == pytest.approx((0.13 - 0.075 * 2.175 / 17.17, 2 * 17.17 * inch))
+    found = effective(backbone, 2 * inch, 9.81)
+    force = 0.13 - 0.075 * 2.175 / 17.17 + 2 / (2 * 17.17)
+    assert found.force == pytest.approx(force)
+    assert found.period == pytest.approx(2 * pi * sqrt(2 * inch / (9.81 * force)))
+
+
+def test_single_pendulum_of_the_examples_of_opensees() -> None:
+    """A. Schellenberg (2009), TestFPS2d_0.tcl: R = 34.68 in, mu = 0.163, 18 kip, contact area 7.0686 in2.
+
+    The script gives the stiffness of sliding for the element beside it, 0.519 kip/in.
+    """
+    inch, kip = 0.0254, 4448.22
+    slider = 2 * sqrt(7.0686 / pi)
+    assert slider == pytest.approx(3.0, rel=1e-5)
+    bearing = Bearing.from_sheet(
+        device="single", effective_radius=[34.68 * inch], height=[0.0], friction=[0.163],
+        slider_diameter=[slider * inch], dish_diameter=[12 * inch], axial_load=18 * kip,
+    )  # fmt: skip
+    backbone = published_backbone(bearing)
+    ((_, _, start, slope),) = regimes(backbone)
+    assert start == pytest.approx(0.163) and slope * 18 * inch == pytest.approx(0.519, abs=5e-4)
+
+
+def test_isolators_of_a_published_plant() -> None:
+    """Virtual Test Bed of Idaho National Laboratory, generic MSR: R = 1 m, mu = 0.06, contact radius 0.2 m, 10.75 MN.
+
+    T = 2 pi sqrt(R/g) = 2.01 s, stiffness, damping and pressure by hand.
+    """
+    bearing = Bearing.from_sheet(
+        device="single", radius=[1.0], height=[0.0], friction=[0.06], slider_diameter=[0.4], dish_diameter=[1.2],
+        yield_displacement=1e-3, axial_load=10.75e6,
+    )  # fmt: skip
+    backbone = published_backbone(bearing)
+    ((_, _, _, slope),) = regimes(backbone)
+    assert 2 * pi / sqrt(9.81 * slope) == pytest.approx(2.006, abs=5e-4)
+    found = effective(backbone, 0.2, 9.81)
+    assert found.stiffness * 10.75e6 == pytest.approx(10.75e6 * (1.0 + 0.06 / 0.2))
+    assert found.damping == pytest.approx(2 / pi * 0.06 / 0.26)
+    pressure = 10.75e6 / (pi * 0.2**2)
+    assert pressure == pytest.approx(85.5e6, rel=1e-3)
+
+
+def test_dishes_that_would_meet_are_refused() -> None:
+    """Two dishes of one radius, 2 h apart, meet where each is h deep: at sqrt(2 R h - h^2) from the axis."""
+    R, h = 0.4, 0.05
+    edge = 2 * sqrt(2 * R * h - h**2)
+    sheet = {
+        "device": "double", "radius": [R], "height": [h], "friction": [0.05], "slider_diameter": [0.1],
+        "axial_load": 1e6,
+    }  # fmt: skip
+    Sheet(**sheet, dish_diameter=[edge - 1e-6])
+    with pytest.raises(InputError, match=r"dishes of surfaces 1 and 2 are 0.1 m apart .* they would meet"):
+        Sheet(**sheet, dish_diameter=[edge + 1e-6])
 
 
 def test_single_and_double_are_one_regime() -> None:
