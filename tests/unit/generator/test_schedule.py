@@ -6,6 +6,7 @@ import inspect
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +14,7 @@ from msfp_gen import Effects, Layout
 from msfp_gen.generator import directions, drivers
 from msfp_gen.generator import schedule as schedules
 from msfp_gen.generator.derive import Equations, derive
+from msfp_gen.generator.lower import lower
 from msfp_gen.generator.program import Program
 from msfp_gen.generator.schedule import (
     Call,
@@ -166,3 +168,18 @@ def test_what_moves_with_the_ends_and_is_read_is_found_from_the_schedule() -> No
     assert {"acx", "acy", "acz"} == full["forward"].tangents - massless["forward"].tangents
     assert not {"rcx", "vcx"} & full["forward"].tangents
     assert not any(use.active for use in full["top_wrench"].inputs if use.block.name.endswith("_parameters"))
+
+
+@pytest.mark.parametrize(("uplift", "counts"), [(False, (1166, 1462)), (True, (1930, 2569))])
+def test_operations_of_a_direction_are_those_of_the_page(uplift: bool, counts: tuple[int, int]) -> None:
+    """Why the ends of a two-port have kernels of their own (docs/architecture.md)."""
+    equations = equations_of(top_rotation=True, uplift=uplift)
+    programs = {program.name: program for program in equations.programs}
+    found = []
+    for moves in (directions.ENDS, None):
+        along = replace(directions.BY_ENDS, moves=moves)
+        kernels = directions.directed(along, condensed(equations.spec.effects), programs, equations.blocks)
+        found.append(sum(lower(kernel).tangent_operations for kernel in kernels.values()))
+    assert tuple(found) == counts
+    page = (Path(__file__).parents[3] / "docs" / "architecture.md").read_text(encoding="utf-8")
+    assert all(str(count) in page for count in counts)
