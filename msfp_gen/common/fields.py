@@ -255,8 +255,9 @@ def check_fields(instance: Any, path: str) -> None:
     Texts with units are accepted, such as radius="39 in"; None is accepted where it is the default. Raises InputError
     that names `path.field`, the value and the remedy.
     """
+    values = vars(instance)
     for name, rule, default in ruled_fields(type(instance)):
-        value = getattr(instance, name)
+        value = values[name]
         if value is None and default is None:
             continue
         try:

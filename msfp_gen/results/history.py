@@ -7,7 +7,7 @@ here and the dataset in `dataset.py` are based on them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Annotated, Any, ClassVar, Literal, get_origin, get_type_hints
 
@@ -347,14 +347,14 @@ class Extremes:
     @property
     def arrays(self) -> dict[str, Array]:
         """What was recorded, by name, without its times; see `Extremes` for shapes and units."""
-        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "times"}
-        return {name: value for name, value in values.items() if value is not None}
+        return {name: value for name, value in vars(self).items() if value is not None and name != "times"}
 
     def __or__(self, other: Extremes) -> Extremes:
         """Extremes of both; where they are equal the earlier time counts."""
-        extremes, times = other.arrays | self.arrays, dict(other.times) | dict(self.times)
-        for name in self.arrays.keys() & other.arrays.keys():
-            one, two, at, later = self.arrays[name], other.arrays[name], self.times[name], other.times[name]
+        ours, theirs = self.arrays, other.arrays
+        extremes, times = theirs | ours, {**other.times, **self.times}
+        for name in ours.keys() & theirs.keys():
+            one, two, at, later = ours[name], theirs[name], self.times[name], other.times[name]
             beyond = two < one if name in LEAST else two > one
             extremes[name] = np.where(beyond, two, one)
             times[name] = np.where(beyond | ((two == one) & (later < at)), later, at)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from math import log, pi, sqrt
@@ -21,6 +21,7 @@ from msfp_gen.specification.friction_laws import (
     SPIN_NUMBERS,
     VARIABLES,
     Law,
+    Spin,
     law_parameter_names,
 )
 
@@ -99,12 +100,10 @@ def check_bearing(law: Law | None, word: str, spin: str, bearing: Bearing) -> No
     where the law is not valid with its parameters. law: None for constant friction. word, spin: those of
     `Effects.friction` and `Effects.spin`.
     """
-    laws = {other.word: {*other.parameters, *other.also_accepted} for other in BUILT_IN.values()}
-    laws |= {word: set() if law is None else {*law.parameters, *law.also_accepted}}
-    moments = {name: set(way.values) for name, way in SPIN.items()}
+    laws, names = {**BUILT_IN, word: law}, law_parameter_names()
     for index, surface in enumerate(bearing.surfaces):
-        _check_takers(surface, index, law_parameter_names(), f"effects.friction = {word!r}", laws[word], laws)
-        _check_takers(surface, index, SPIN_NUMBERS, f"effects.spin = {spin!r}", moments[spin], moments)
+        _check_takers(surface, index, names, f"effects.friction = {word!r}", laws, word)
+        _check_takers(surface, index, SPIN_NUMBERS, f"effects.spin = {spin!r}", SPIN, spin)
         _drilling_numbers(spin, surface, index)
         if law is not None:
             defect = _defect(law, (("mu", surface.friction), *law_parameters(law, bearing, index).items()))
@@ -125,15 +124,26 @@ def bearing_for(bearing: Bearing, friction: str | None) -> Bearing:
     return replace(bearing, surfaces=tuple(replace(surface, **gone) for surface in bearing.surfaces))
 
 
+def _taken(by: Law | Spin | None) -> Collection[str]:
+    """The fields of a surface that a law or a drilling moment takes; none with constant friction."""
+    if by is None:
+        return ()
+    return by.values if isinstance(by, Spin) else {*by.parameters, *by.also_accepted}
+
+
 def _check_takers(
-    surface: Surface, index: int, names: Iterable[str], chosen: str, takes: set[str], takers: Mapping[str, set[str]]
+    surface: Surface, index: int, names: Iterable[str], chosen: str, takers: Mapping[str, Law | Spin | None], word: str
 ) -> None:
-    """Raise InputError where a surface has one of these numbers, which what is `chosen` does not take."""
+    """Raise InputError where a surface has one of these numbers, which the taker of this word does not take.
+
+    chosen: what has the word, for the message.
+    """
+    values = vars(surface)
     for name in names:
-        if name not in takes and getattr(surface, name) is not None:
-            users = " or ".join(repr(word) for word, others in takers.items() if name in others) or "'custom'"
+        if values[name] is not None and name not in _taken(takers[word]):
+            users = " or ".join(repr(other) for other, taker in takers.items() if name in _taken(taker)) or "'custom'"
             raise InputError(
-                f"bearing.surfaces[{index}].{name} = {getattr(surface, name)} (surface {index + 1}): "
+                f"bearing.surfaces[{index}].{name} = {values[name]} (surface {index + 1}): "
                 f"{chosen} has no such parameter; leave it out or give {users}"
             )
 

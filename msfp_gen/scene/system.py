@@ -10,7 +10,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
 from importlib.resources.abc import Traversable
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
@@ -192,4 +191,6 @@ def is_system(value: object) -> bool:
 @cache
 def kinds() -> Mapping[str, Kind]:
     """The kinds of systems beside a scene of one bearing, by their keys; their modules are loaded here."""
+    from importlib.metadata import entry_points  # slow, as it imports the parser of mails
+
     return {point.name: point.load() for point in entry_points(group=GROUP)}

@@ -255,7 +255,13 @@ def _preset(name: str) -> Bearing:
 
 def _row(kind: type, row: Mapping[str, Any], word: str, path: str) -> Any:
     with errors_at(word, path):
-        return kind(**row)
+        return _row_of(kind, tuple(row.items()))
+
+
+@lru_cache(maxsize=256)  # bodies of a study of friction are read once
+def _row_of(kind: type, values: tuple[tuple[str, Any], ...]) -> Any:
+    """A surface or body, which is immutable."""
+    return kind(**dict(values))
 
 
 def _of_fields(kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:

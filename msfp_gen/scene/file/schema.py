@@ -86,23 +86,16 @@ class Value(Reader):
     """Reads a value by the `parse` of a rule, texts with units included."""
 
     def __init__(self, parse: Callable[..., Any]) -> None:
-        self._parse = parse
+        self.parse = parse
 
     @property
     def remedy(self) -> str:  # type: ignore[override]
         """That of the rule."""
         try:
-            self._parse(None, text=True)
+            self.parse(None, text=True)
         except ValueError as error:
             return str(error)
         return Reader.remedy
-
-    def read(self, value: Any, place: Place, errors: Errors) -> Any:
-        """As of `Reader`."""
-        try:
-            return self._parse(value, text=True)
-        except ValueError as error:
-            errors.add(f"{place.fact(value)}: {error}")
 
 
 class Key(NamedTuple):
@@ -136,7 +129,15 @@ class Keys(Reader):
         found = {}
         for name, (reader, default) in self.keys.items():
             if name in value:
-                found[name] = reader.read(value[name], place.key(name), errors)
+                try:  # most keys have values, and most of them are right: their place is not asked for
+                    found[name] = (
+                        reader.parse(value[name], text=True)
+                        if isinstance(reader, Value)
+                        else reader.read(value[name], place.key(name), errors)
+                    )
+                except ValueError as error:
+                    found[name] = None
+                    errors.add(f"{place.key(name).fact(value[name])}: {error}")
             elif default is MISSING and name not in absent:
                 errors.add(f"{place.key(name).path}{place.note} is missing: {reader.remedy}")
         for name in value if len(found) < len(value) else ():
