@@ -12,6 +12,7 @@ from msfp_gen.common.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.auditing import audit as audit
+    from msfp_gen.auditing.shadow import shadow as shadow
     from msfp_gen.buildings.building import Building as Building
     from msfp_gen.buildings.figures import plot_axial_forces as plot_axial_forces
     from msfp_gen.buildings.figures import plot_building as plot_building
@@ -132,6 +133,7 @@ _MODULES = {
     "plot_sliding": "figures",
     "plot_stages": "figures",
     "presets": "scene.file.presets",
+    "shadow": "auditing.shadow",
     "simulate": "simulation.simulate",
     "simulate_batch": "studies.batch",
     "study": "studies.run",

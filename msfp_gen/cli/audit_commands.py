@@ -1,4 +1,4 @@
-"""Commands on results of any program: audit (checks against mechanics and the data of the bearing)."""
+"""Commands on results of any program: audit (checks), shadow (the full model under the recorded motion)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from msfp_gen.cli.console import AsJson, answer, note, scenes
+from msfp_gen.cli.console import AsJson, Output, answer, note, scenes
 from msfp_gen.common.output import check_output
 
 app = typer.Typer()
@@ -51,3 +51,27 @@ def audit(
         note(f"wrote {page}")
     if found.inconsistent:
         raise typer.Exit(1)
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen shadow results.csv --bearing bearing.toml --map map.toml\n"
+    "  msfp-gen shadow run.nc --bearing scene.toml -o model.nc"
+)
+def shadow(
+    result: ResultFile,
+    bearing: BearingSource,
+    map_: MapFile = None,
+    output: Output = None,
+    as_json: AsJson = False,
+) -> None:
+    """Drive the full model by a recorded motion and axial force; which effects the other program's element lacks."""
+    from msfp_gen.auditing.shadow import shadow as run_shadow
+    from msfp_gen.results.files import check_result_path, save
+
+    if output is not None:
+        check_result_path(output, "--output")
+    found = run_shadow(result, bearing, map_)
+    answer(found.as_dict, found.tables, as_json)
+    if output is not None:
+        save(found.result, output)
+        note(f"wrote {output}")

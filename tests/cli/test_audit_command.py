@@ -91,3 +91,13 @@ def test_the_example_of_the_page_prints_what_it_says(capsys):
     exec(code, {})
     said = re.search(r"It prints `(.*?)`", PAGE)
     assert said and capsys.readouterr().out.strip() == said[1]
+
+
+def test_a_shadow_is_printed_and_written(tmp_path, capsys):
+    assert main(["run", "fenz-test3", "-o", str(tmp_path / "run.csv")]) == 0
+    capsys.readouterr()
+    arguments = ["shadow", str(tmp_path / "run.csv"), "--bearing", "fenz-test3"]
+    assert main([*arguments, "-o", str(tmp_path / "model.nc"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["difference"] < 0.01 and found["missing"] == []
+    assert (tmp_path / "model.nc").exists()
