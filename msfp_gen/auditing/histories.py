@@ -75,7 +75,7 @@ class Histories:
                 f"{name}_2" not in self.columns]  # fmt: skip
 
     def vector(self, name: str, axes: int = 2) -> Array:
-        """Columns `name`_1, ... , zero where one is not given, ndarray, shape (T, axes) [SI]."""
+        """The columns of a quantity along every axis, zero where one is not given, ndarray, shape (T, axes) [SI]."""
         zero = np.zeros_like(self.time)
         return np.column_stack([self.columns.get(f"{name}_{i + 1}", zero) for i in range(axes)])
 

@@ -93,11 +93,10 @@ def test_the_example_of_the_page_prints_what_it_says(capsys):
     assert said and capsys.readouterr().out.strip() == said[1]
 
 
-def test_a_shadow_is_printed_and_written(tmp_path, capsys):
-    assert main(["run", "fenz-test3", "-o", str(tmp_path / "run.csv")]) == 0
-    capsys.readouterr()
-    arguments = ["shadow", str(tmp_path / "run.csv"), "--bearing", "fenz-test3"]
-    assert main([*arguments, "-o", str(tmp_path / "model.nc"), "--json"]) == 0
+def test_a_shadow_is_printed_and_written(files, capsys):
+    """The force of half the bearings: the axial force is half too, so the model follows it."""
+    places = [str(files / "out.csv"), "--bearing", str(files / "scene.toml"), "--map", str(files / "map.toml")]
+    assert main(["shadow", *places, "-o", str(files / "model.nc"), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["difference"] < 0.01 and found["missing"] == []
-    assert (tmp_path / "model.nc").exists()
+    assert found["model"]["status"] == "ok" and (files / "model.nc").exists()
