@@ -102,6 +102,7 @@ SHARE = 0.1  # lateral acceleration over gravity at which drifts are compared
 DRIFT = 0.05  # drift over the height of the storey above which the stiffness is doubtful
 HEIGHT = 20.0  # height of a storey above which it is doubtful [m]
 OF_INTERFACES = 0.2  # share of the interfaces in the strain energy of a mode, above which they can damp the mode
+SLOWEST = 0.05  # frequency of any mode below which a stiffness or an inertia is doubtful [Hz]
 SAG = 0.05  # compression of the spring of an interface at rest above which its stiffness is doubtful [m]
 
 
@@ -137,7 +138,7 @@ OF_BUILDING = (
     ),
     Check(
         _frequency,
-        (0.05, np.inf),
+        (SLOWEST, np.inf),
         "building: the lowest frequency on a fixed base is {value:.3g} Hz; are stiffnesses in N/m and N m/rad, of "
         "torsion and rocking too?",
     ),
@@ -175,6 +176,7 @@ def building_doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
             f"{sags[index]:.3g} m at rest; is it in N/m, not in kN/m?"
         )
         yield 0, float(springs[index]), text
+    yield from _soft(scene)
     yield from _undamped(scene)
 
 
@@ -258,6 +260,18 @@ def _drifts(building: Building, acceleration: float) -> Array:
     response = fixed.modes @ (fixed.modes.T @ np.transpose(forces) / fixed.frequencies[:, None] ** 2)
     drifts: Array = np.linalg.norm(rows @ response, axis=1).max(axis=1)
     return drifts
+
+
+def _soft(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
+    """A doubt where the building rocks or heaves on its interfaces more slowly than any building does."""
+    modes = scene.vertical_modes
+    squares = modes.squares[modes.shares > OF_INTERFACES]
+    if len(squares) and (frequency := float(np.sqrt(max(squares.min(), 0.0)) / (2 * np.pi))) < SLOWEST:
+        text = (
+            f"building: on the vertical springs of its interfaces it rocks or heaves at {frequency:.3g} Hz; are their "
+            "stiffnesses in N/m, positions in m, and moments of inertia in kg m^2?"
+        )
+        yield 0, frequency, text
 
 
 def _undamped(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:

@@ -22,7 +22,6 @@ from msfp_gen.cli.console import (
     note,
     note_exceeded,
     note_written,
-    require_meant,
     result_of,
     say,
     show,
@@ -106,18 +105,19 @@ def bound(
         raise InputError(f"--{'leave-out' if leave_out else 'workers'}: it is for the runs of a suite; give --suite")
     from msfp_gen.common.output import make_folder
     from msfp_gen.scene.file.source import load_scene
+    from msfp_gen.scene.plausibility import require_meant
     from msfp_gen.studies.bounding import load_factors
     from msfp_gen.studies.bounding import runs as module
 
     chosen = load_scene(scene)
     table = module.factors_of(chosen) if factors is None else load_factors(factors)
-    require_meant(chosen, force)
+    require_meant(chosen, force=force)  # before anything is written
     module.bounded_scenes(chosen, table)  # refuses a table that does not fit the bearing before anything is written
     if output is not None:
         make_folder(output, "--output")
     build(chosen)
     with Progress("3 cases") as progress:
-        bounds = module.bound(chosen, table, progress=progress)
+        bounds = module.bound(chosen, table, force=force, progress=progress)
     answer(bounds.as_dict(), module.bounding_tables(bounds), as_json)
     if output is not None:
         written = [c.result.to_netcdf(output / f"{c.name}.nc") for c in bounds.cases if c.result is not None]
@@ -156,6 +156,7 @@ def _bound_suite(
     """`bound` under every motion of a suite: numbers and the figure, without the rows in time of the runs."""
     from msfp_gen.common.output import make_folder
     from msfp_gen.scene.file.source import load_scene
+    from msfp_gen.scene.plausibility import require_meant
     from msfp_gen.studies.bounding import CASES, factors_of
     from msfp_gen.studies.bounding import suite as module
 
@@ -163,8 +164,7 @@ def _bound_suite(
     with Progress("suite") as progress:
         study = module.suite_study(scene, suite, chosen, progress)
     module.check_left_out(leave_out, study)
-    for run in range(len(CASES), study.runs + 1, len(CASES)):
-        require_meant(study.scene(run), force)
+    require_meant(*map(study.scene, range(len(CASES), study.runs + 1, len(CASES))), force=force)
     if output is not None:
         make_folder(output, "--output")
     build(study.scene(1))
@@ -223,6 +223,7 @@ def fit(
         Path | None,
         typer.Option(metavar="FILE.html", help="Write a page with values, limits, loops and residuals; no network."),
     ] = None,
+    force: Force = False,
     as_json: AsJson = False,
 ) -> None:
     """Fit friction and other values of a scene to laboratory tests, with 95 % intervals.
@@ -241,7 +242,8 @@ def fit(
     read = _measurements(tests, column or (), axial_load, weights)
     paths = [path for text in parameters for path in text.split(",")]
     limits = dict(_limits(text) for text in bounds or ())
-    prepared = start_fit(chosen, read, paths, limits, offset)  # refuses bad input before anything is built or written
+    # Bad input is refused before anything is built or written.
+    prepared = start_fit(chosen, read, paths, limits, offset, force=force)
     if output is not None:
         make_folder(output, "--output")
     for fitted_scene in prepared.scenes:

@@ -23,7 +23,6 @@ from msfp_gen.cli.console import (
     note_written,
     number,
     numbers,
-    require_meant,
     say,
     scenes,
     show,
@@ -76,6 +75,7 @@ def batch(
 ) -> None:
     """Simulate many scenes, or one with fields varied, on all cores. Ctrl-C keeps the runs that have ended."""
     from msfp_gen.scene.file.loader import load_suite
+    from msfp_gen.scene.plausibility import require_meant
     from msfp_gen.studies.batch import ENDED
     from msfp_gen.studies.sweep import variations, varied_field
 
@@ -85,8 +85,7 @@ def batch(
     with Progress("suite") as progress:
         records = () if suite is None else load_suite(suite, progress).records
     chosen = [variation for source in sources for variation in variations(source, fields, records)]
-    for variation in chosen:
-        require_meant(variation.scene, force)
+    require_meant(*(variation.scene for variation in chosen), force=force)
     rows: list[Row] = []
     with _reported(rows, len(chosen), table, as_json):
         _run(chosen, workers, output, rows)

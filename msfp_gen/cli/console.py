@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 
-from msfp_gen.common.errors import InputError, RunError, printable
+from msfp_gen.common.errors import RunError, printable
 from msfp_gen.common.fields import Choice, Rule, ruled_fields
 from msfp_gen.results.sign import SIGNS
 from msfp_gen.specification.layout import Effects
@@ -277,24 +277,17 @@ def build(scene: System, gradients: bool = False) -> None:
 Force = Annotated[bool, typer.Option("--force", help="Run also with values that no unit can make right.")]
 
 
-def require_meant(scene: System, force: bool = False) -> None:
-    """Raise InputError for a value that is a thousand times off, unless `force`."""
-    from msfp_gen.scene.plausibility import refusals
-
-    if not force and (found := refusals(scene)):
-        raise InputError(f"{'; '.join(found)} (`msfp-gen run`, `batch` and `bound` accept it with --force)")
-
-
 def run_scene(scene: Any, force: bool = False, **options: Any) -> tuple[Any, RunError | None]:
     """Run a scene; its result (of a failed run as far as it was computed), and the error of a failed run.
 
-    force: as of `require_meant`.
+    force: as of `plausibility.require_meant`.
     """
+    from msfp_gen.scene.plausibility import require_meant
     from msfp_gen.scene.scene import Scene
     from msfp_gen.simulation.memory import require_memory
     from msfp_gen.simulation.simulate import simulate
 
-    require_meant(scene, force)
+    require_meant(scene, force=force)
     if isinstance(scene, Scene):
         require_memory([scene])
     build(scene)

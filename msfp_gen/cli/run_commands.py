@@ -23,7 +23,6 @@ from msfp_gen.cli.console import (
     note_written,
     number,
     parser_of,
-    require_meant,
     run_scene,
     say,
     show,
@@ -267,7 +266,9 @@ def _run(
     """Simulate, print and save; returns the paths. A failed run is printed and saved before its error is raised."""
     within = None
     if target is not None:
-        require_meant(scene, force)
+        from msfp_gen.scene.plausibility import require_meant
+
+        require_meant(scene, force=force)
         within = target.simulate(scene)
     options = {"strict": strict} | checkpoints.arguments
     with checkpoints.hint_on_write_error():

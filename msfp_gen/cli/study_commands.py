@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from msfp_gen.cli.console import AsJson, Progress, Workers, answer, interruptible, note, number, numbers, say
+from msfp_gen.cli.console import AsJson, Force, Progress, Workers, answer, interruptible, note, number, numbers, say
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.common.tables import TABLE_SUFFIXES
@@ -95,6 +95,7 @@ def run(
     ] = None,
     budget: Annotated[str | None, typer.Option(metavar="TIME", help="Of all runs of the estimate: 10min.")] = None,
     plot: Plot = None,
+    force: Force = False,
     as_json: AsJson = False,
 ) -> None:
     """Run what is missing of a study, or estimate a statistic of it. Ctrl-C at any time: the same command continues."""
@@ -114,7 +115,7 @@ def run(
     question = {
         "quantity": estimate, "statistic": statistic, "threshold": threshold, "target": target, "budget": budget,
     }  # fmt: skip
-    engine: dict[str, Any] = {"workers": workers, "dask": dask}
+    engine: dict[str, Any] = {"workers": workers, "dask": dask, "force": force}
     if "accuracy" in definition.table or any(value is not None for value in question.values()):
         if shard is not None:
             raise InputError("--shard: the runs of an estimate depend on those before; give --workers or --dask")

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import G
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
@@ -329,6 +330,13 @@ def refusals(system: Any) -> list[str]:
     if not isinstance(system, Scene):
         return list(dict.fromkeys(system.refusals()))
     return [text for (_, _, text), refused in judged((*OF_BEARING, *OF_RUN), subject_of(system)) if refused]
+
+
+def require_meant(*systems: Any, force: bool = False) -> None:
+    """Raise InputError for values of systems that no unit can make right, unless `force`."""
+    found = [] if force else list(dict.fromkeys(text for system in systems for text in refusals(system)))
+    if found:
+        raise InputError(f"{'; '.join(found)} (a command runs it with --force, a function of Python with force=True)")
 
 
 def ringing(path: str, damping: float, what: str, turn: float, ratio: float, cure: float) -> str:

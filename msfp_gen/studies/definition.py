@@ -7,6 +7,7 @@ any run.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import resources
@@ -209,6 +210,14 @@ class Study:
         if self.cells is not None:
             codes = list(np.unravel_index(self.cells[sample], self.grid)) if self.grid else []
         return Task(number, first, tuple(codes), self.samples[sample])
+
+    @property
+    def ends(self) -> list[System]:
+        """The scenes of the first and the last run, which have the first and the last values of all gridded axes."""
+        scenes = [self.scene(1)]
+        with suppress(InputError):  # which becomes a row with its message
+            scenes.append(self.scene(self.runs))
+        return scenes
 
     def scene(self, run: int) -> System:
         """The scene of one run, by its number in the table, from 1. Raises InputError."""

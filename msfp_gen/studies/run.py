@@ -31,6 +31,7 @@ from msfp_gen.common.tables import Table, parquet_bytes
 from msfp_gen.common.version import __version__
 from msfp_gen.jit.cache import digest_sources
 from msfp_gen.scene.file.loader import dumps, toml_file
+from msfp_gen.scene.plausibility import require_meant
 from msfp_gen.studies.axes import INTENSITY, SceneFactory, StudyInputs
 from msfp_gen.studies.batch import (
     BAD_INPUT,
@@ -76,6 +77,7 @@ def study(
     executor: Executor | None = None,
     dask: str | None = None,
     shard: tuple[int, int] = (1, 1),
+    force: bool = False,
     progress: Progress | None = None,
 ) -> Outcome:
     """Run the missing chunks of a study; each chunk becomes one Parquet file in the folder of the study.
@@ -90,6 +92,7 @@ def study(
         executor: an executor (`concurrent.futures`) to run on, such as that of mpi4py or Parsl; it stays open.
         dask: address or scheduler file of a Dask cluster to run on.
         shard: (i, n): only every n-th chunk, from the i-th; for job arrays that share `output`.
+        force: also with values of the first or the last run that no unit can make right.
         progress: called with the number of runs done, by earlier calls too, and the number of runs of the shard.
 
     Raises InputError before any run: invalid input, or a folder with another study; RunError: workers died, or more
@@ -97,6 +100,7 @@ def study(
     """
     _check_shard(shard)
     definition = source if isinstance(source, Study) else load_study(source)
+    require_meant(*definition.ends, force=force)
     with pool_from(workers, executor, dask) as pool:
         return run_on(pool, definition, Path(output), shard, progress)
 

@@ -36,6 +36,7 @@ from msfp_gen.results.quantities import Source, quantities
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.fidelity import check_stack
 from msfp_gen.scene.friction_parameters import proportional
+from msfp_gen.scene.plausibility import require_meant
 from msfp_gen.scene.scene import Scene
 from msfp_gen.specification.friction_laws import Law
 from msfp_gen.studies.batch import ENDED, completed_runs
@@ -188,17 +189,20 @@ def factors_of(scene: System) -> FactorTable:
     return SHEET if has else load_factors("asce7")
 
 
-def bound(scene: System, table: FactorTable = SHEET, *, progress: Progress | None = None) -> Bounds:
+def bound(
+    scene: System, table: FactorTable = SHEET, *, force: bool = False, progress: Progress | None = None
+) -> Bounds:
     """Run a scene with its properties at lower bound, nominal value and upper bound; of a building, of all bearings.
 
     A case that fails is part of the result, and the other cases are run. All cases have the same effects: where `Auto`
     ends with different models, all cases run again with every effect that any of them needs.
 
-    table: of factors; without it the lower and upper friction of the bearing itself. progress: called with the share
-    of the runs that is done, and 1. Raises InputError: a bearing without bounds, a factor of a surface that the
-    bearing does not have, a pendulum that is "equivalent" to a stack, or a bearing that does not move; RunError: no
-    case has rows.
+    table: of factors; without it the lower and upper friction of the bearing itself. force: also with values that no
+    unit can make right. progress: called with the share of the runs that is done, and 1. Raises InputError: a bearing
+    without bounds, a factor of a surface that the bearing does not have, a pendulum that is "equivalent" to a stack, or
+    a bearing that does not move; RunError: no case has rows.
     """
+    require_meant(scene, force=force)
     cases = _cases(scene, table, progress)
     models = [case.result.provenance.get("model", "").split(", then ")[-1] for case in cases if case.result is not None]
     if (wider := scene.with_effects_of(models)) is not None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
+from msfp_gen.scene.plausibility import require_meant
 from msfp_gen.studies.calibration.fit_result import Estimate, Fit
 from msfp_gen.studies.calibration.intervals import Identified, Spread, identified, lag_one, noise_of, spread_of, weak
 from msfp_gen.studies.calibration.measurement import FittedTest, Measurement, read_measurement
@@ -31,7 +32,6 @@ from msfp_gen.studies.calibration.residuals import (
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
-
 CORRELATED = 0.5  # correlation of consecutive residuals above which the fit has a note
 GIVES_WAY = 0.02  # movement of the rig over the largest displacement, above which the fit has a note
 
@@ -46,6 +46,7 @@ def fit(
     columns: Mapping[str, str] | None = None,
     progress: Progress | None = None,
     max_evaluations: int = 100,
+    force: bool = False,
 ) -> Fit:
     """Fit parameters of a scene so that its runs give the measured forces of tests.
 
@@ -65,11 +66,13 @@ def fit(
             done, and the last deviation [N]. An exception in it ends the fit.
         max_evaluations: largest number of evaluations in the search; the runs with smaller tolerances after the search
             are not counted.
+        force: also from values of the scene that no unit can make right.
 
     Raises InputError of one line: a file, a parameter or a bound is wrong, or runs of the scene have no gradients.
     RunError: a run of the given scene fails, or the fit has not converged after `max_evaluations`.
     """
-    return end_fit(scene, start_fit(scene, tests, parameters, bounds, offset, columns, progress), max_evaluations)
+    residuals = start_fit(scene, tests, parameters, bounds, offset, columns, progress, force)
+    return end_fit(scene, residuals, max_evaluations)
 
 
 def end_fit(scene: Scene, residuals: Residuals, max_evaluations: int = 100) -> Fit:
@@ -94,12 +97,14 @@ def start_fit(
     offset: bool = False,
     columns: Mapping[str, str] | None = None,
     progress: Progress | None = None,
+    force: bool = False,
 ) -> Residuals:
     """Check the input of a fit; returns its residuals. Arguments and InputError as of `fit`."""
     if isinstance(tests, str | Path | Measurement) or not tests:
         raise InputError(f"tests = {tests!r}: give a list of files or measurements")
     measured = [test if isinstance(test, Measurement) else read_measurement(test, columns) for test in tests]
     sampled = tuple(test.sampled() for test in _with_distinct_names(measured))
+    require_meant(scene, force=force)
     scenes = scenes_of(scene, sampled)
     unknowns = unknowns_of(scenes[0], parameters, bounds)
     if any(test.axial_load is not None for test in sampled):

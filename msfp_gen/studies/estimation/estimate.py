@@ -22,6 +22,7 @@ from msfp_gen.common.fields import Choice, Quantity, check_fields, to_si
 from msfp_gen.common.tables import Table
 from msfp_gen.figures.style import COLOURS, FAINT, INK, headline, page
 from msfp_gen.scene.fidelity import at_fidelity
+from msfp_gen.scene.plausibility import require_meant
 from msfp_gen.studies.assessment.rows import labelled
 from msfp_gen.studies.axes import SceneFactory
 from msfp_gen.studies.definition import Study, load_study
@@ -179,6 +180,7 @@ def estimate(
     workers: int | None = None,
     executor: Executor | None = None,
     dask: str | None = None,
+    force: bool = False,
     progress: Any = None,
 ) -> Estimate:
     """Estimate a statistic of a quantity over the draws of a study, with few exact runs.
@@ -187,7 +189,7 @@ def estimate(
     The folder is the folder of a study with the exact runs; the runs of each cheaper model are a study in a folder
     within it. The same call continues an interrupted estimate.
 
-    source, workers, executor, dask: as of `study`. folder: of the study. quantity to seed: as in
+    source, workers, executor, dask, force: as of `study`. folder: of the study. quantity to seed: as in
     `Question`, by default the keys of `[accuracy]` in the study file; target and budget also as texts, such as "2 %"
     and "10 min". progress: called with the name of a model and a number of draws before the runs of these draws.
 
@@ -195,6 +197,7 @@ def estimate(
     removed again; RunError: workers died; the same call continues.
     """
     study = source if isinstance(source, Study) else load_study(source)
+    require_meant(*study.ends, force=force)
     question = question_of(
         study, quantity=quantity, statistic=statistic, threshold=threshold, target=target, budget=budget,
         models=None if models is None else tuple(models), pilot=pilot, seed=seed,

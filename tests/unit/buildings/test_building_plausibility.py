@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from support import ROOT
 
-from msfp_gen import InputError, Scene, changed_scene, load_scene, presets
+from msfp_gen import InputError, Measurement, Scene, bound, changed_scene, fit, load_scene, presets, study
 from msfp_gen.buildings.notes import building_doubts, floors, value_notes
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.cli import main
 from msfp_gen.scene.file.loader import scene_text
-from msfp_gen.scene.plausibility import doubtful_values, refusals, scene_doubts
+from msfp_gen.scene.plausibility import doubtful_values, refusals, require_meant, scene_doubts
+from msfp_gen.studies.bounding import load_factors
+from msfp_gen.studies.estimation.estimate import estimate
 
 HOSPITAL = "hospital-clc"
 
@@ -118,6 +123,12 @@ MISTAKES: list[tuple[str, dict[str, Any], str, bool]] = [
         "the lowest frequency on a fixed base is 0",
         False,
     ),
+    (
+        HOSPITAL,
+        {"building.base.inertia": [8.4e12, 19.0e12, 27.4e12]},  # in kg mm^2
+        "on the vertical springs of its interfaces it rocks or heaves at 0.0",
+        False,
+    ),
     (HOSPITAL, {"limits": {"displacement": 760}}, "limits.displacement = 760 m is 1.1e+03 times the capacity", True),
 ]
 
@@ -153,11 +164,17 @@ def test_what_cannot_be_is_refused(changes: dict[str, Any], words: str) -> None:
         building(changes)
 
 
+def scene_files(folder: Path) -> list[Path]:
+    """The scenes below a folder; studies and suites are none."""
+    tables = {path: tomllib.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.rglob("*.toml"))}
+    return [path for path, table in tables.items() if {"bearing", "building"} & table.keys() and "motion" in table]
+
+
 def test_no_published_design_is_blamed() -> None:
     for name in [
         *presets.names("scene"),
         *presets.names("building"),
-        *(str(path) for path in sorted((ROOT / "examples").glob("*.toml"))),
+        *map(str, scene_files(ROOT / "examples")),
     ]:
         scene = load_scene(name)
         assert not doubts_of(scene) and not refusals(scene), name
@@ -179,10 +196,41 @@ def test_what_is_refused_runs_if_it_is_told_to(tmp_path: Any, capsys: Any) -> No
     assert main(["run", str(path), "-o", str(out)]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and "limits.displacement = 760 m" in error and "--force" in error and not out.exists()
-    for command in (["batch", str(path)], ["bound", str(path)], ["characterise", str(path)]):
+    axis = '{multiplies = "bearing.friction", values = [1.0]}'
+    (tmp_path / "study.toml").write_text(f'scene = "scene.toml"\nkeep = ["peak_force"]\naxes.f = {axis}\n')
+    rows = [f"{0.05 * i:.2f},{0.02 * np.sin(0.05 * i):.6f},{1e4 * np.sin(0.05 * i):.3f}" for i in range(40)]
+    (tmp_path / "test.csv").write_text("\n".join(["time [s],displacement [m],force [N]", *rows]))
+    of_study = ["study", str(tmp_path / "study.toml"), "-o", str(tmp_path / "study")]
+    of_fit = ["fit", str(path), str(tmp_path / "test.csv"), "-p", "bearing.surfaces[*].friction"]
+    for command in (["batch", str(path)], ["bound", str(path)], ["characterise", str(path)], of_study, of_fit):
         assert main(command) == 2 and "limits.displacement = 760 m" in capsys.readouterr().err
+    assert not (tmp_path / "study").exists()
     assert main(["run", str(path), "--force", "-o", str(out)]) == 0 and out.is_file()
     assert "limits.displacement = 760 m" in capsys.readouterr().err
+
+
+def test_functions_of_python_refuse_what_commands_refuse(tmp_path: Any) -> None:
+    """Before anything is run or written; simulate names it in the notes of its result."""
+    scene = changed_scene("fenz-test2", {"limits": {"displacement": 760.0}, "duration": 0.5})
+    path = tmp_path / "scene.toml"
+    path.write_text(scene_text(scene))
+    axes = {"f": {"sets": "limits.displacement", "values": [0.2, 760.0]}}
+    table = {"scene": str(path), "keep": ["peak_force"], "axes": axes}
+    time = np.arange(0.0, 2.0, 0.05)
+    measured = Measurement("test", time, 0.02 * np.sin(time), 1e4 * np.sin(time))
+    calls = [
+        lambda: bound(scene, load_factors("asce7")),
+        lambda: fit(scene, [measured], ["bearing.surfaces[*].friction"]),
+        lambda: study(table, tmp_path / "out"),
+        lambda: estimate(table, tmp_path / "out", "peak_force", target=0.1),
+    ]
+    for call in calls:
+        with pytest.raises(InputError, match=r"limits.displacement = 760 m is .* force=True"):
+            call()
+    assert not (tmp_path / "out").exists()
+    require_meant(scene, force=True)
+    with ThreadPoolExecutor(1) as executor:
+        assert study(table, tmp_path / "out", executor=executor, force=True).failed == 0
 
 
 def test_a_single_bearing_has_no_plan() -> None:
