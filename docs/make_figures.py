@@ -13,12 +13,14 @@ import numpy as np
 import run_tutorial
 
 from msfp_gen import figures, load_scene, simulate, study
+from msfp_gen.cli.run_commands import DEMO, DEMO_TOLERANCES
 from msfp_gen.figures import style
 from msfp_gen.motions.records import baseline_corrected, bundled, response_spectrum
 from msfp_gen.results.geometry import sections
 from msfp_gen.results.joining import at_times
 from msfp_gen.results.result import Result
 from msfp_gen.studies import fragility, ida, plot_fragility, plot_ida, read_study
+from msfp_gen.studies.accuracy.study import draw_summary, work_precision
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from quick import docs_folder, parser, pick
@@ -139,6 +141,12 @@ def draw_cost(folder: Path) -> None:
     figures.plot_work_precision(table, folder / "gallery-work-precision.png", errors=named, title="fenz-test2")
 
 
+def draw_demo(folder: Path) -> None:
+    """What accuracy costs in the first scene of `make demo`, for README."""
+    found = work_precision(load_scene(DEMO[0]), methods=["implicit"], tolerances=pick(DEMO_TOLERANCES, (1e-2,)))
+    draw_summary(found, folder / "demo-accuracy.png")
+
+
 def draw_study(folder: Path) -> None:
     """IDA and fragility of the study of docs/studies.md."""
     with TemporaryDirectory() as place:
@@ -160,6 +168,7 @@ def main(folder: Path = FOLDER) -> None:
     draw_hospital(folder)
     draw_record(folder)
     draw_cost(folder)
+    draw_demo(folder)
     draw_study(folder)
     print(f"figures in {folder}")
 
