@@ -1,4 +1,4 @@
-"""Draw the figures of docs/figures.md, docs/tutorial.md and docs/studies.md: `python docs/make_figures.py [FOLDER]`."""
+"""Draw figures of README, docs/figures.md, tutorial.md and studies.md: `python docs/make_figures.py [FOLDER]`."""
 
 from __future__ import annotations
 
