@@ -59,7 +59,10 @@ VARIATIONS: dict[str, dict[str, Any]] = {  # of the hospital on four bearings, b
     "four bearings, half the record": {"motion.scale": 0.5},
     "four bearings, a tenth of the record": {"motion.scale": 0.1},
     "four bearings, 1.4 times the record": {"motion.scale": 1.4},
-    "four bearings, friction constant": {"building.effects": {"friction": "constant", "bouc_wen": "plastic"}},
+    "four bearings, friction constant": {
+        "building.effects": {"friction": "constant", "bouc_wen": "plastic"},
+        "bearings.isolator": {"preset": "building-tfp"},
+    },
     "four bearings, all effects by choice": {"building.effects": {}},
     "four bearings, damping 2 %, up to 60 Hz": {"building.damping_ratio": 0.02, "building.highest_frequency": 60.0},
     "four bearings, hard ground": {"building.interface.vertical_stiffness": 1e10},

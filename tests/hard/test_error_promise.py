@@ -34,7 +34,7 @@ def test_the_stated_error_of_presets_and_examples_holds(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ("hospital-clc", "hospital-ccc", *promises.VARIATIONS))
 def test_the_stated_error_of_buildings_holds(name: str) -> None:
-    """Displacement of bearings, base shear, floor accelerations and drifts, against all effects that bearings may have."""
+    """Displacement of bearings, base shear, floor accelerations and drifts, against all effects of the bearings."""
     found = promises.promise(name, dict(promises.buildings())[name], **promises.OF_BUILDINGS)
     assert found.kept and set(found.true.parts) == {"bearing_displacement", "base_shear", "floor_acceleration", "drift"}
     assert found.stated is not None and found.stated <= promises.TARGET, found
