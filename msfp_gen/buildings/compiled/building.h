@@ -58,7 +58,10 @@ typedef struct {
     task *what;
     int *taken; /* [count] bearings of each that have been begun; from here on shared without the lock */
     long generation; /* of the task, from 1; ENDED */
-    int pending, sleeping, waiting; /* threads at work, without work; whether the one that asks sleeps */
+    int unfinished, sleeping, waiting; /* bearings; threads without work; whether the one that asks sleeps */
+    int together, trial; /* whether the threads work; whether this is the way that was slower, timed again */
+    long calls;          /* of the present way */
+    double since, period, each[2]; /* when it began, and for how long it is kept [s]; time of a call alone, together [s] */
 } pool;
 
 struct msfp_building {

@@ -76,6 +76,7 @@ typedef struct {
     int method;                               /* enum msfp_method */
     double rtol, max_step, first_step, max_steps, end, output_step;
     int threads;
+    int timed; /* whether the threads work only where that is faster, by the clock */
     msfp_lapack lapack;
 } msfp_building_scene;
 

@@ -60,7 +60,7 @@ cdef extern from "msfp_building.h":
         const double *span_steps
         int span_count, method
         double rtol, max_step, first_step, max_steps, end, output_step
-        int threads
+        int threads, timed
         msfp_lapack lapack
     ctypedef struct msfp_building_progress:
         int status, bearing, surface
@@ -118,7 +118,7 @@ cdef class Run:
 
     def __cinit__(self, matrices, shares, dampers, springs, ports, rows, grounds, ground_of, entries, faces, vectors, node_rows, arms, *, double weight, stops, jumps,
                   span_ends, span_steps, int method, double rtol, double max_step, double first_step, double max_steps,
-                  double end, double output_step, int threads):
+                  double end, double output_step, int threads, bint timed):
         cdef msfp_building_scene s
         cdef int i
         held, self.nodes = [ports], len(node_rows)
@@ -134,7 +134,7 @@ cdef class Run:
         s.vector_rows, s.vector_grounds, s.arms = _doubles(held, vectors[1]), _doubles(held, vectors[2]), _doubles(held, arms)
         s.nodes, s.node_rows = len(node_rows), _doubles(held, node_rows)
         s.weight, s.rtol, s.max_step, s.first_step, s.max_steps = weight, rtol, max_step, first_step, max_steps
-        s.end, s.output_step, s.threads, s.method = end, output_step, threads, method
+        s.end, s.output_step, s.threads, s.timed, s.method = end, output_step, threads, timed, method
         s.stops, s.stop_count, s.jumps, s.jump_count = _doubles(held, stops), len(stops), _doubles(held, jumps), len(jumps)
         s.span_ends, s.span_steps, s.span_count = _doubles(held, span_ends), _doubles(held, span_steps), len(span_ends)
         s.lapack.syrk = <void *>dsyrk

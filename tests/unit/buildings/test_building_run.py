@@ -29,6 +29,14 @@ def test_results_do_not_depend_on_the_number_of_threads():
     assert same(one, three) and one.counters == three.counters
 
 
+def test_results_do_not_depend_on_the_way_that_the_clock_chooses(monkeypatch):
+    """Threads by the clock: some stages alone, some together, as the machine happens to be loaded."""
+    monkeypatch.setattr("msfp_gen.buildings.run.BEARINGS_OF_A_THREAD", 1)
+    monkeypatch.setattr("msfp_gen.buildings.run.usable_cores", lambda: 3)
+    one, chosen = simulate(EVENTFUL, threads=1), simulate(EVENTFUL)
+    assert same(one, chosen) and one.counters == chosen.counters
+
+
 @pytest.mark.parametrize("effects", [None, Effects(uplift=True)], ids=["default", "uplift"])
 def test_a_restored_run_continues_bit_by_bit(effects):
     made = replace(EVENTFUL, bearings=[replace(each, effects=effects) for each in EVENTFUL.bearings], duration=0.3)
