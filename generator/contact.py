@@ -167,7 +167,7 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
         {name: values[name] for name in b.contact.quantities},
         tangents=("M", "dY", "dZ", "N") if law is None else ("M", "dY", "dZ", "mu", "N"),
         columns="MSFP_FRAME_INPUTS",
-        slopes=slopes,
+        slopes=[name for name in slopes if name in b.contact.quantities],  # in a plane the law has no slope along Z
     )
     p.lanes = "MSFP_LANES"
     return p

@@ -218,3 +218,10 @@ def test_what_no_scene_of_a_model_can_ask_for_is_not_compiled() -> None:
     assert "dopri5.c" not in files(sliders="massless") and not ports & files(top_rotation=True, dimension="planar")
     kernels = text("msfp_kernels.h")
     assert not [word for word in ("rotation_angles", "far_end", "end_wrench", "locking") if word in kernels]
+
+
+@pytest.mark.parametrize("friction", ["velocity", "pvt"])
+def test_a_planar_model_with_a_friction_law_is_derived(friction):
+    """In a plane the contact keeps no slope of the law along Z."""
+    spec = ModelSpec(Layout(2, 1, 0), Effects(dimension="planar", rims=False, sliders="massless", friction=friction))
+    assert any(re.search(r"law_Y", file) for file in generate(spec).files.values())
