@@ -31,7 +31,7 @@ def test_one_sign_per_surface(layout):
         ((5, -2, 6), ("layout.m = -2", "not below 0")),
         ((5.0, 2, 2), ("layout.n = 5.0", "whole number")),
         ((True, 0, 0), ("layout.n = True", "whole number")),
-        (("5", 2, 2), ("layout.n = '5'", "whole number")),
+        (("5", 2, 2), ("layout.n = '5'", "plain number")),
     ],
 )
 def test_impossible_layouts_are_refused(counts, words):
