@@ -77,7 +77,8 @@ def shortened(folder: Path) -> Path:
         for one, key in ((suite["records"][0], "bundled"), (suite["records"][2], "file"))
     ]
     path = folder / "suite.toml"
-    path.write_text("\n".join(['scale_to = { pga = "0.3 g" }', "records = [", *lines, "]\n"]), encoding="utf-8")
+    text = "\n".join(['scale_to = { sa = "0.4 g", period = 1.0 }', "records = [", *lines, "]\n"])
+    path.write_text(text, encoding="utf-8")
     return path
 
 

@@ -407,7 +407,9 @@ def load_study(source: str | Path | Mapping[str, Any], progress: Progress | None
     if not is_input(path):
         raise InputError(f"study = {str(source)!r}: no such file; `msfp-gen study --example` prints one to start from")
     with prefixed(f"{path}: "):
-        return _study(toml_file(path), path.parent, progress)
+        table = toml_file(path)
+        # Of the folder of a study, whose paths are absolute: its records may lie beside it.
+        return _study(table, path.resolve().parent.parent if "about" in table else path.parent, progress)
 
 
 def _study(table: Mapping[str, Any], folder: Path | None, progress: Progress | None) -> Study:

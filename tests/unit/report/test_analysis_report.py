@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
@@ -28,7 +29,7 @@ from msfp_gen.studies.bounding import CASES, bound_suite, load_suite_bounds, sui
 SUITE = """
 records = [
     { bundled = "ridgecrest-2019-ci-ccc", duration = 5.0, name = "CCC" },
-    { bundled = "ridgecrest-2019-ci-clc", duration = 5.0, name = "CLC <b>" },
+    { file = "records/clc.v1.gz", duration = 5.0, name = "CLC <b>" },
 ]
 scale_to = { sds = "1 g", sd1 = "0.6 g", between = [1.0, 3.0], component = "rotd100" }
 """
@@ -59,6 +60,9 @@ def building() -> dict[str, Any]:
 def folder(tmp_path_factory: Any) -> Path:
     folder = Path(tmp_path_factory.mktemp("suite"))
     (folder / "suite.toml").write_text(SUITE)
+    (folder / "records").mkdir()  # beside the folder of the runs, as in a project
+    record = ROOT / "msfp_gen" / "motions" / "records" / "files" / "ridgecrest-2019-ci-clc.v1.gz"
+    shutil.copy(record, folder / "records" / "clc.v1.gz")
     bound_suite(suite_study(building(), folder / "suite.toml", "sheet"), folder / "out")
     return folder / "out"
 
@@ -224,9 +228,7 @@ def cases(folder: Path, copy: Path) -> Iterator[tuple[list[str], str]]:
 
 
 def test_what_cannot_be_reported_is_one_line(folder: Path, tmp_path: Path, capsys: Any) -> None:
-    import shutil
-
-    copy = Path(shutil.copytree(folder, tmp_path / "inner" / "copy"))
+    copy = Path(shutil.copytree(folder, folder.with_name("copy")))
     page = tmp_path / "page.html"
     for arguments, words in cases(folder, copy):
         assert main(["report", *arguments, "-o", str(page)]) == 2, words
