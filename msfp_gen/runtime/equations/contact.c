@@ -17,7 +17,7 @@
 enum {
     LANES = MSFP_LANES,
     FRICTION = MSFP_FRICTION_FORCE_SIZE,
-    UNKNOWNS = FRICTION + MSFP_LAW,   /* local unknowns: g, and mu where it follows a law */
+    UNKNOWNS = MSFP_LOCAL_UNKNOWNS,
     ROWS = MOMENT + UNKNOWNS + 1,     /* of the Jacobian of a contact: M, dY, dZ, mu, N */
     INPUTS = MSFP_CONTACT_FRAME_SIZE, /* force and slip rotation */
     SOURCE = MSFP_CONTACT_ROWS -
@@ -277,8 +277,7 @@ MSFP_INLINE void condense_closed_form(const double *par, lanes *all, const doubl
 }
 #endif
 
-/* Jacobian with g and mu eliminated: [MSFP_CONTACT_ROWS][INPUTS][lane]. The matrix of the local
- * unknowns is close to the identity plus a dissipative part, so that elimination needs no pivots. */
+/* Jacobian with g and mu eliminated: [MSFP_CONTACT_ROWS][INPUTS][lane]. */
 MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
 {
     double jacobian[ROWS * MSFP_FRAME_INPUTS * LANES], a[UNKNOWNS][UNKNOWNS + INPUTS][LANES];
@@ -292,15 +291,7 @@ MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
                 a[r][c][s] = c < UNKNOWNS ? (r == c) - scaled : scaled;
             }
         }
-    for (int k = 0; k < UNKNOWNS; ++k) /* Gauss-Jordan elimination */
-        for (int r = 0; r < UNKNOWNS; ++r) {
-            double factor[LANES];
-            for (int s = 0; s < LANES; ++s)
-                factor[s] = r == k ? 1.0 - 1.0 / a[k][k][s] : a[r][k][s] / a[k][k][s];
-            for (int c = k + 1; c < UNKNOWNS + INPUTS && r != k; ++c)
-                for (int s = 0; s < LANES; ++s)
-                    a[r][c][s] -= factor[s] * a[k][c][s];
-        }
+    msfp_eliminate_friction(UNKNOWNS + INPUTS, a[0]);
     /* Of the source of a memory only gradients need derivatives (msfp_tangent_with_slopes). */
     memset(condensed + SOURCE * INPUTS * LANES, 0, (MSFP_CONTACT_ROWS - SOURCE) * INPUTS * LANES * sizeof *condensed);
     for (int r = 0; r < SOURCE; ++r) {

@@ -16,7 +16,7 @@
 enum {
     LANES = MSFP_LANES,
     FRICTION = MSFP_FRICTION_FORCE_SIZE,
-    UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns of a contact: g, and mu where it follows a law */
+    UNKNOWNS = MSFP_LOCAL_UNKNOWNS,
     RESULTS = MSFP_CONTACT_RESULTS,
     INPUTS = MSFP_CONTACT_INPUTS,  /* the unknowns come last */
     GIVEN = INPUTS - UNKNOWNS,
@@ -29,44 +29,38 @@ static const struct {
 /* Indices in the block of a contact. The moment comes first, then what the equations of the unknowns contain. */
 static const int result[RESULTS] = MSFP_CONTACT_RESULT_LIST;
 
-/* Eliminate the local unknowns from the Jacobians. They are g = fp + tau df/dt, and mu by its law; their matrix is near
- * the identity, so that elimination needs no pivots. rates: df/dt; rates and tau by lanes. */
+/* Eliminate the local unknowns from the Jacobians. They are g = fp + tau df/dt, and mu by its law. rates: df/dt; rates and
+ * tau by lanes. */
 MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, double (*restrict jacobian)[INPUTS][LANES],
                            double (*restrict slopes)[INPUTS][LANES])
 {
-    double a[UNKNOWNS][INPUTS][LANES]; /* of the unknowns by the given inputs, then their matrix */
+    double a[UNKNOWNS][INPUTS][LANES];
     for (int r = 0; r < UNKNOWNS; ++r)
         MSFP_UNROLL
         for (int i = 0; i < INPUTS; ++i) {
             const int stage = r < FRICTION && input[i].block == STAGE, given = i < GIVEN;
             const double past = stage && input[i].index == MSFP_FRICTION_STAGE_Y + r;
-            const double own = given ? past : -(i - GIVEN == r);
             for (int s = 0; s < LANES; ++s) {
-                const double slope = (r < FRICTION ? tau[s] : 1.0) * jacobian[MOMENT + r][i][s] + own +
+                const double slope = (r < FRICTION ? tau[s] : 1.0) * jacobian[MOMENT + r][i][s] + past +
                                      (stage && input[i].index == MSFP_FRICTION_STAGE_TAU ? rates[r * LANES + s] : 0.0);
-                a[r][i][s] = given ? slope : -slope;
+                a[r][given ? UNKNOWNS + i : i - GIVEN][s] = given ? slope : (i - GIVEN == r) - slope;
             }
         }
+    msfp_eliminate_friction(INPUTS, a[0]);
     for (int u = 0; u < UNKNOWNS; ++u) {
-        double inverse[LANES], factor[LANES];
+        double inverse[LANES];
         for (int s = 0; s < LANES; ++s)
-            inverse[s] = 1.0 / a[u][GIVEN + u][s];
-        for (int i = 0; i < INPUTS; ++i)
+            inverse[s] = 1.0 / a[u][u][s];
+        for (int i = UNKNOWNS; i < INPUTS; ++i)
             for (int s = 0; s < LANES; ++s)
                 a[u][i][s] *= inverse[s];
-        for (int r = 0; r < UNKNOWNS; ++r) {
-            memcpy(factor, a[r][GIVEN + u], sizeof factor);
-            for (int i = 0; i < INPUTS && r != u; ++i)
-                for (int s = 0; s < LANES; ++s)
-                    a[r][i][s] -= factor[s] * a[u][i][s];
-        }
     }
     for (int r = 0; r < rows; ++r)
         for (int i = 0; i < GIVEN; ++i)
             for (int s = 0; s < LANES; ++s) {
                 double sum = jacobian[r][i][s];
                 for (int u = 0; u < UNKNOWNS; ++u)
-                    sum += jacobian[r][GIVEN + u][s] * a[u][i][s];
+                    sum += jacobian[r][GIVEN + u][s] * a[u][UNKNOWNS + i][s];
                 slopes[r][i][s] = sum;
             }
 }
