@@ -20,7 +20,7 @@ from msfp_gen.buildings.oscillators import FixedBase, Oscillators
 from msfp_gen.buildings.storey import FREEDOMS, MOTIONS, BaseSlab, Columns, Node, Storey, frame, rigid
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, MsfpError
-from msfp_gen.common.fields import LARGEST, require_type
+from msfp_gen.common.fields import LARGEST, quantities, require_type
 from msfp_gen.common.inputs import read_input
 from msfp_gen.common.tables import Printed, Rows
 
@@ -111,6 +111,7 @@ class Building(Printed):
         return "Building", rows
 
     @classmethod
+    @quantities(damping_ratio="", rayleigh_frequencies="Hz")
     def shear(
         cls,
         base: BaseSlab,

@@ -110,7 +110,7 @@ def _difference(study: Study, row: Any, result: Any) -> tuple[float, int]:
     """Largest relative difference of the quantities of a run from a row, and the number of quantities."""
     values, _ = study.keep.values(result, {})
     pairs = [(values[name], row[name]) for name in study.keep.numbers if row[name] == row[name]]  # not NaN
-    known = [(np.nan if again is None else again, before) for again, before in pairs]
+    known = [(np.inf if again is None or again != again else again, before) for again, before in pairs]  # not NaN
     most = max((abs(again - before) / abs(before or 1.0) for again, before in known), default=0.0)
     return float(most), len(pairs)
 

@@ -171,7 +171,7 @@ UNSEEN = {
     "equivalent": "fidelity = 'equivalent': one pendulum with the longest sliding regime of the published backbone; it "
     "does not see the other regimes, the single surfaces and their rims, heat, uplift and the tilt of the top plate; "
     "its friction is constant, by a friction law at the load at rest, the largest velocity of the base and the start "
-    "temperature; it ends when 99 % of the motion of the base have passed",
+    "temperature; without a load it ends when 99 % of the motion of the base have passed",
     "rigid": "fidelity = 'rigid': the building is one rigid body; it does not see drifts and floor accelerations",
 }
 

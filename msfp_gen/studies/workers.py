@@ -33,7 +33,6 @@ AHEAD = 2  # calls in flight for each worker, so that no worker is idle
 CONNECT = "20s"  # time in which a Dask scheduler must answer
 UNKNOWN = 64  # workers that are assumed of an executor that does not state their number
 START = 1.0  # time that calls in threads wait [s], for all workers together, after which processes are tried
-UNPICKLED = (pickle.PicklingError, AttributeError, TypeError)  # what pickle raises
 IDLE = 300.0  # time without a call after which processes end [s]; the next call starts others
 TRIED = 2, 0.1  # calls of each worker, and their processor time [s], by which threads and then processes are measured
 
@@ -221,8 +220,8 @@ def local_pool(workers: int | None = None, ways: Ways | None = None) -> Iterator
 @atexit.register
 def end_idle() -> None:
     """End the workers that are not in use."""
-    for idle in _idle.values():
-        while idle:
+    for (process, _), idle in _idle.items():
+        while idle and process == os.getpid():  # a fork has no threads of its parent
             idle.pop().shutdown()
 
 
@@ -252,11 +251,11 @@ class Workers(Executor):
         return self._threads.submit(self._call, function, arguments, report)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """As of `Executor`; calls that run are ended."""
+        """As of `Executor`; calls that run are ended. cancel_futures: also those that run in processes."""
         self._stop.set()
         with self._lock:
             if self._processes is not None:
-                self._processes.shutdown(kill_workers=True)
+                self._processes.shutdown(kill_workers=cancel_futures)
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
 
     def _begin_thread(self) -> None:
@@ -297,7 +296,7 @@ class Workers(Executor):
 
         try:
             call = cloudpickle.dumps((function, arguments))
-        except UNPICKLED as error:
+        except Exception as error:  # pickle passes on what the objects raise
             raise _UnsuitedError from error
         with self._lock:
             if self._stop.is_set():
@@ -343,7 +342,7 @@ def _answer(call: bytes) -> tuple[bytes, float, int]:
     worked, stream = time.thread_time() - begin, io.BytesIO()
     try:
         _Pickler(stream, arguments).dump(value)
-    except UNPICKLED as error:
+    except Exception as error:
         raise _UnsuitedError(repr(error)) from None
     return stream.getvalue(), worked, os.getpid()
 
