@@ -472,8 +472,8 @@ def _energy(rows: Any) -> list[str]:
         return []
     worst = rows.loc[error.idxmax()]
     lines = [
-        f"In {len(error)} of {len(rows)} runs the work of the ground and the loads was compared with all energy that is "
-        "stored and dissipated. "
+        f"In {len(error)} of {len(rows)} runs the work of the ground and the loads was compared with all energy "
+        "that is stored and dissipated. "
         f"The difference is an error of the computation: at most {100 * error.max():.2g} % of the peak energy "
         f"({worst['record']}, {worst['bounds']}), {100 * error.median():.2g} % in the median run."
     ]

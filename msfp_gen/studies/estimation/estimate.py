@@ -281,7 +281,8 @@ class _State:
         """What a cheap model gives at the first draws, shape (count, k): its quantities, or whether they exceed.
 
         exact: outcomes of the exact model. In a probability each quantity of the cheap model has the threshold beyond
-        which, or at an early end, as many of the same draws are as of the exact model.
+        which, or at an early end, as many of the same draws are as of the exact model: midway between two draws, for at
+        the least exceedance too few of all others lie beyond.
         """
         values, early = self.source.values(level, count)
         self.early[level] = int(early.sum())
@@ -293,7 +294,11 @@ class _State:
             beyond = len(exact) - beyond
             values = np.column_stack([-values[:, :1], values[:, 1:]])
         worst = np.where(early[:, None], np.inf, values)
-        limits = np.sort(worst[: len(exact)], axis=0)[-beyond] if beyond else np.nan
+        if not beyond:
+            return np.zeros_like(worst)
+        ordered = np.sort(worst[: len(exact)], axis=0)
+        reached, below = ordered[-beyond], ordered[-min(beyond + 1, len(exact))]
+        limits = np.where(np.isfinite(reached) & np.isfinite(below), reached / 2 + below / 2, reached)
         return (worst >= limits).astype(float)
 
     def work(self, moment: Moment, level: str) -> float:

@@ -11,7 +11,7 @@ from scipy.stats import binom, norm, t
 from msfp_gen import InputError
 from msfp_gen.studies import estimate, read_study
 from msfp_gen.studies.definition import example_text
-from msfp_gen.studies.estimation.estimate import PILOT, Question, estimate_table, estimated, plot_estimate
+from msfp_gen.studies.estimation.estimate import PILOT, Question, _State, estimate_table, estimated, plot_estimate
 from msfp_gen.studies.estimation.estimators import mean_of, optimal_runs, work
 
 SPREAD, NOISE = 0.5, 0.1  # standard deviation of the logarithm, and share of it that the cheap model does not see
@@ -306,6 +306,18 @@ def test_a_cheap_model_exceeds_as_often_as_the_exact_one(side, threshold):
     expected = beyond if side == "most" else np.mean((source._values["exact"] >= threshold) & ~source._early)
     assert found.interval[0] <= expected <= found.interval[1]
     assert found.correlation["equivalent"] == pytest.approx(1.0) and found.plain_seconds > 3 * found.seconds
+
+
+def test_a_matched_threshold_is_beyond_as_many_draws_as_the_exact_one_in_the_mean():
+    """The smallest cheap exceedance as the limit would leave out one draw in 500 of the others: a tenth of 0.02."""
+    chance, exact, cheap, shares = 0.02, 500, 20_000, []
+    for seed in range(150):
+        source = Lognormal(seed, population=cheap)
+        source._values["exact"] = np.random.default_rng(seed).uniform(size=cheap)
+        source._values["equivalent"] = 3.0 * source._values["exact"] ** 0.8
+        state = _State(source, Question("q", "probability", 1.0 - chance, target=0.01))
+        shares.append(state.controls("equivalent", cheap, source._values["exact"][:exact]).mean())
+    assert np.mean(shares) == pytest.approx(chance, abs=4 * np.std(shares) / np.sqrt(len(shares)))
 
 
 def test_runs_that_end_early_count_as_below_where_the_least_is_the_worst():
