@@ -299,7 +299,8 @@ class _State:
         ordered = np.sort(worst[: len(exact)], axis=0)
         reached, below = ordered[-beyond], ordered[-min(beyond + 1, len(exact))]
         limits = np.where(np.isfinite(reached) & np.isfinite(below), reached / 2 + below / 2, reached)
-        return (worst >= limits).astype(float)
+        exceeds: Array = (worst >= limits).astype(float)
+        return exceeds
 
     def work(self, moment: Moment, level: str) -> float:
         """Time by a cheap model for an interval, over the time of exact runs alone [-]."""
