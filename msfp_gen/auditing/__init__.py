@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from msfp_gen.auditing.checks import CHECKS, CONSISTENT, INCONSISTENT, OPEN, Case, Finding
-from msfp_gen.auditing.columns import read_histories
+from msfp_gen.auditing.columns import histories_from, read_histories
 from msfp_gen.auditing.corrections import corrected
-from msfp_gen.auditing.histories import Histories, histories_of
-from msfp_gen.auditing.stated import Stated, stated_of
+from msfp_gen.auditing.histories import Histories
+from msfp_gen.auditing.stated import stated_of
 from msfp_gen.common.tables import Table
 
 __all__ = ["Audit", "Finding", "Histories", "audit", "read_histories"]
@@ -103,13 +103,8 @@ def audit(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | N
 
     Raises InputError: a file, map or bearing that cannot be read, or times that do not increase.
     """
-    stated: Stated = stated_of(bearing)
-    if isinstance(source, Histories):
-        given = source
-    elif isinstance(source, str | Path):
-        given = read_histories(source, columns)
-    else:
-        given = histories_of(source)
+    stated = stated_of(bearing)
+    given = histories_from(source, columns)
     data, found = corrected(given, stated)
     case = Case(given, stated, data, found)
     findings = tuple(Finding(key, title, *check(case)) for key, (title, check) in CHECKS.items())

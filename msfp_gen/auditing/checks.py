@@ -26,8 +26,10 @@ BOUND_FLOOR = 0.05  # of the bound of friction: it is a single row, not a mean
 COUPLING_FLOOR, HEAT_FLOOR = 0.15, 0.25  # of the parts that follow the axial force, and the temperature
 DAMPING_FLOOR = 0.05  # force along the velocity over friction
 NO_TENSION = 1e-3  # tension over the load at rest that a stiff contact may have
+LEAST_VERTICAL = 0.005  # vertical acceleration over gravity from which on a mass follows from it
 COARSE = 0.02  # error of the work of friction by the rows
 UNSURE = 0.3  # error of radius and friction from which on nothing is said
+GIVEN_BACK = 0.01  # of the energy lost
 ROUGH = 0.05  # irregularity of a sliding force over friction
 SPIKE = 0.25  # one row off over friction
 PLATEAU = 5  # rows at an extreme value that are no accident
@@ -115,8 +117,8 @@ class Case:
 
     @property
     def mass(self) -> float | None:
-        """Mass that all bearings support, as stated [kg]."""
-        return self.given.mass if self.given.mass is not None else self.stated.mass
+        """Mass that all bearings support, as stated [kg]; None: it is not stated."""
+        return stated_mass(self.given, self.stated)
 
     @cached_property
     def lean(self) -> Array:
@@ -149,6 +151,13 @@ class Case:
         return factor
 
 
+def stated_mass(data: Histories, stated: Stated) -> float | None:
+    """Mass that all bearings support [kg]: of the map, or of the scene, whose mass is on one bearing; None: unknown."""
+    if data.mass is not None or stated.mass is None:
+        return data.mass
+    return stated.mass * data.bearings
+
+
 def thinned(values: Array) -> Array:
     """Some rows for a drawing, shape (k,) [unit of `values`]."""
     return values[:: -(-len(values) // SHOWN)]
@@ -179,7 +188,10 @@ def signs(case: Case) -> Reading:
         return found
     if lack := case.lacks("displacement", "force"):
         return lack
-    return Reading(CONSISTENT, "the bearing takes up work along every axis, and its axial force is a compression")
+    text = "the bearing takes up work along every axis"
+    if not case.lacks("axial"):
+        text += ", and its axial force is a compression"
+    return Reading(CONSISTENT, text)
 
 
 def units(case: Case) -> Reading:
@@ -253,7 +265,7 @@ def clipped(case: Case) -> Reading:
             )
             drawing = _course(name, data.time, data.columns[name], f"{name} [{unit}]", first)
             return Reading(INCONSISTENT, text, value, unit, float(data.time[first]), drawing)
-    return Reading(CONSISTENT, "no column stays at its largest or smallest value")
+    return Reading(CONSISTENT, "no column is cut off at its largest or smallest value")
 
 
 def _plateau(data: Histories, name: str) -> tuple[int, int, float] | None:
@@ -324,8 +336,9 @@ def mass(case: Case) -> Reading:
     text = f"shear over acceleration implies {implied:.4g} kg, the weight on the bearings at rest {carried:.4g} kg"
     if case.mass is not None:
         text += f", the mass stated is {expected:.4g} kg"
+    slope = np.sign(found.correlation) * expected  # the force of other programs may be the one on the mass
     drawing = Drawing(
-        [("windows", found.acceleration, found.force), (source, found.acceleration, expected * found.acceleration)],
+        [("windows", found.acceleration, found.force), (source, found.acceleration, slope * found.acceleration)],
         "acceleration [m/s²]", "force of all bearings [N]",
         (float(found.acceleration[found.row]), float(found.force[found.row])), True,
     )  # fmt: skip
@@ -344,7 +357,9 @@ def vertical_mass(case: Case) -> Reading:
     found = momentum(data, vertical=True)
     if found is None:
         return Reading(OPEN, "no column acceleration_3 or position_3 of the supported mass; with one this is decided")
-    if found.spread < 0.005 * gravity or not found.one_mass:
+    if found.spread < LEAST_VERTICAL * gravity:
+        return Reading(OPEN, f"the vertical acceleration is {found.spread:.2g} m/s² RMS: too little to decide")
+    if not found.one_mass:
         return Reading(
             OPEN,
             "the axial force does not follow this vertical acceleration; that of the mass on this bearing would decide",
@@ -464,7 +479,10 @@ def radius(case: Case) -> Reading:
     if isinstance(factor, Reading):
         return factor
     stated = case.stated.radius
-    implied = stated / factor.value if factor.value > 0 else float("inf")
+    if factor.value <= 0.0:
+        text = f"while sliding the force does not rise with displacement; the bearing has a radius of {stated:.4g} m"
+        return Reading(INCONSISTENT, text, None, NONE, None, _loop(case))
+    implied = stated / factor.value
     text = f"the slope of the force while sliding implies a radius of {implied:.4g} m; the bearing has {stated:.4g} m"
     good = factor.agrees(1.0, FLOOR)
     return Reading(CONSISTENT if good else INCONSISTENT, text, implied, "m", None, _loop(case))
@@ -569,13 +587,13 @@ def damping(case: Case) -> Reading:
     row = int(sliding.rows[speed.argmax()])
     level = float(np.mean(sliding.law.heated[sliding.rows])) * data.at_rest
     share = factor.value * float(speed.max()) / level
-    text = (
-        f"beside friction a force of {_si(factor.value, 'N s/m')} times the velocity acts, at most "
-        f"{100 * share:.2g} % of friction"
-    )
+    falls = factor.value < 0.0
+    what = "friction is less than by the law, by" if falls else "beside friction acts a force of"
+    text = f"{what} {_si(abs(factor.value), 'N s/m')} times the velocity, at most {100 * abs(share):.2g} % of friction"
     if factor.agrees(0.0, DAMPING_FLOOR * level / float(speed.max())):
         return Reading(CONSISTENT, text, 100 * share, "%")
-    text += ": damping of the structure acts in the bearing, or friction rises with velocity more than the law says"
+    rises = "damping of the structure acts in the bearing, or friction rises with velocity more than the law says"
+    text += f": {'friction falls with velocity more than the law says' if falls else rises}"
     curve = sliding.implied - sliding.law.heated[sliding.rows]
     drawing = Drawing([("implied - law", speed, curve)], "velocity [m/s]", "friction coefficient", None, True)
     return Reading(INCONSISTENT, text, 100 * share, "%", float(data.time[row]), drawing)
@@ -599,12 +617,14 @@ def energy(case: Case) -> Reading:
         2.0 * stated.radius * most**2 * (not stated.rigid) + 2.0 * stated.friction * stated.yielding
     )
     error = float(np.abs(lost - coarse).max()) / 3.0
+    permitted = 1.5 * stored + 3 * error + GIVEN_BACK * max(float(lost[-1]), 0.0)
     text = (
-        f"the bearing dissipates {_si(float(lost[-1]), 'J')}; it gives back "
-        f"{_si(float(back[row]), 'J')} at most, and can store {_si(stored, 'J')}"
+        f"the bearing dissipates {_si(float(lost[-1]), 'J')}; it gives back {_si(float(back[row]), 'J')} at most, "
+        f"where {_si(permitted, 'J')} is permitted: one and a half times the {_si(stored, 'J')} that links and stuck "
+        f"friction store, the error of the rows, and {100 * GIVEN_BACK:g} % of the loss"
     )
     drawing = _course("dissipated", data.time, lost / 1e3, "dissipated [kJ]", row)
-    if back[row] <= 1.5 * stored + 3 * error + 0.01 * abs(lost[-1]) and lost[-1] >= -stored - 3 * error:
+    if back[row] <= permitted:
         return Reading(CONSISTENT, text, float(lost[-1]), "J", None, drawing)
     return Reading(INCONSISTENT, text + ": it makes energy", float(-back[row]), "J", float(data.time[row]), drawing)
 

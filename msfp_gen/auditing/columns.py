@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.auditing.histories import QUANTITIES, Histories
+from msfp_gen.auditing.histories import QUANTITIES, Histories, histories_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, to_si
@@ -146,7 +146,6 @@ def read_histories(path: str | Path, columns: str | Path | Mapping[str, Any] | N
     """
     path = Path(path)
     if path.suffix.lower() == ".nc":
-        from msfp_gen.auditing.histories import histories_of
         from msfp_gen.results.result import load_result
 
         if columns is not None:
@@ -179,6 +178,15 @@ def read_histories(path: str | Path, columns: str | Path | Mapping[str, Any] | N
         None if mass is None else _quantity("mass", mass, "kg"),
         1.0 if bearings is None else _quantity("bearings", bearings, ""),
     )
+
+
+def histories_from(source: Any, columns: str | Path | Mapping[str, Any] | None = None) -> Histories:
+    """The histories of a file, a `Result`, or `Histories` as they are. Raises InputError."""
+    if isinstance(source, str | Path):
+        return read_histories(source, columns)
+    if columns is not None:
+        raise InputError("columns: only a file needs a map; leave it out")
+    return source if isinstance(source, Histories) else histories_of(source)
 
 
 def _columns(source: Any) -> Mapping[str, Any]:

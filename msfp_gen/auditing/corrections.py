@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from msfp_gen.auditing.checks import INCONSISTENT, Reading
+from msfp_gen.auditing.checks import INCONSISTENT, OPEN, Reading, stated_mass
 from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.momentum import momentum
 from msfp_gen.auditing.sliding import CLOSED, ERRORS, Sliding
 from msfp_gen.auditing.stated import Stated
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.fields import G
 
 AGAINST = 0.1  # work against the motion over the sum of its parts, from which on a sign is wrong
 FAR = 1.5  # ratio from which on a unit is suspected
@@ -24,7 +25,6 @@ FORCES = {
     2.248089e-4: "kips",
     0.1019716: "kilogram-forces",
 }
-GRAVITY = 9.80665
 
 
 def corrected(data: Histories, stated: Stated) -> tuple[Histories, dict[str, Reading]]:
@@ -34,11 +34,10 @@ def corrected(data: Histories, stated: Stated) -> tuple[Histories, dict[str, Rea
     data = data.scaled(factors)
     if texts:
         found["signs"] = Reading(INCONSISTENT, "; ".join(texts) + "; it is turned in what follows")
-    factors, text, value = _units(data, stated)
-    if text:
-        found["units"] = Reading(INCONSISTENT, f"{text}; it is put right in what follows", value)
-        data = data.scaled(factors)
-    return data, found
+    factors, reading = _units(data, stated)
+    if reading is not None:
+        found["units"] = reading
+    return data.scaled(factors), found
 
 
 def _signs(data: Histories) -> tuple[dict[str, float], list[str]]:
@@ -53,12 +52,20 @@ def _signs(data: Histories) -> tuple[dict[str, float], list[str]]:
         if all(name in data.columns for name in names):
             force, u = (data.columns[name] for name in names)
             parts = 0.5 * (force[1:] + force[:-1]) * np.diff(u)
-            if parts.sum() < -AGAINST * np.abs(parts).sum():
+            if parts.sum() < -AGAINST * np.abs(parts).sum() - _stored(force, u):
                 turned.append(names[0])
                 factors[names[0]] = -1.0
     if turned:
         texts.append(f"{' and '.join(turned)} and displacement have opposite signs: the loop gives energy")
     return factors, texts
+
+
+def _stored(force: Array, displacement: Array) -> float:
+    """Energy that curvature may give back between the ends of a record, by its own stiffness in any units."""
+    if not np.ptp(displacement):
+        return 0.0
+    stiffness = np.polyfit(displacement, force, 1)[0]
+    return float(abs(stiffness * (displacement[-1] ** 2 - displacement[0] ** 2)) / 2.0)
 
 
 def _ratio(data: Histories, stated: Stated) -> float:
@@ -80,30 +87,53 @@ def _ratio(data: Histories, stated: Stated) -> float:
     return worst
 
 
-def _units(data: Histories, stated: Stated) -> tuple[dict[str, float], str, float | None]:
-    """Factors of columns in another unit, the sentence, and the factor; no text where all units fit."""
+def _units(data: Histories, stated: Stated) -> tuple[dict[str, float], Reading | None]:
+    """Factors of columns in another unit, and what was found; None where all units fit."""
     whole = not data.missing("displacement", "force", "axial") and data.at_rest > 0
-    if whole and _ratio(data, stated) > FAR and (found := _other_unit(data, stated)) is not None:
-        return found
+    ratio = _ratio(data, stated) if whole else 1.0
+    found = (_other_unit(data, stated) if ratio > FAR else None) or _other_acceleration(data, stated)
+    if found is not None:
+        factors, text, value = found
+        return factors, Reading(INCONSISTENT, f"{text}; it is put right in what follows", value)
+    if ratio > FAR:
+        text = (
+            f"sizes are off by a factor of up to {ratio:.3g} from those of the bearing, and no other unit of one "
+            "quantity explains it; the other checks say what differs"
+        )
+        return {}, Reading(OPEN, text, ratio)
+    return {}, None
+
+
+def _other_acceleration(data: Histories, stated: Stated) -> tuple[dict[str, float], str, float] | None:
+    """The unit of acceleration with which the inertia is that of the weight; None: there is none."""
     inertia = momentum(data)
     if inertia is not None and inertia.one_mass and "axial" in data.columns:
         ratio = inertia.mass / (data.at_rest * data.bearings / stated.bearing.gravity)
-        for factor, words in ((1.0 / GRAVITY, "m/s², named g"), (GRAVITY, "g, named m/s²")):
+        for factor, words in ((1.0 / G, "m/s², named g"), (G, "g, named m/s²")):
             if abs(ratio / factor - 1.0) < CLOSE:
                 names = [name for name in data.columns if name.startswith(("acceleration", "position"))]
                 text = f"shear over acceleration implies {ratio:.3g} of the mass: the acceleration looks like {words}"
                 return dict.fromkeys(names, factor), text, factor
-    return {}, "", None
+    return None
 
 
 def _other_unit(data: Histories, stated: Stated) -> tuple[dict[str, float], str, float] | None:
-    """The unit of one quantity with which radius and friction are those stated; None: there is none."""
-    best: tuple[float, dict[str, float], str, float] | None = None
+    """The unit of one quantity with which radius and friction are those stated; None: there is none.
+
+    Units of force and of axial force that fit alike are told apart by the weight of the stated mass.
+    """
+    mass = stated_mass(data, stated)
+    best: tuple[tuple[float, float], dict[str, float], str, float] | None = None
     for kind, units in (("displacement", LENGTHS), ("force", FORCES), ("axial", FORCES)):
         names = [name for name in data.columns if name.startswith(kind)]
         for factor, unit in units.items():
-            off = _fits(data.scaled(dict.fromkeys(names, 1.0 / factor)), stated)
-            if off is not None and (best is None or off < best[0]):
+            other = data.scaled(dict.fromkeys(names, 1.0 / factor))
+            fit = _fits(other, stated)
+            if fit is None:
+                continue
+            carried = other.at_rest * other.bearings / stated.bearing.gravity
+            off = (round(fit, 6), 0.0 if mass is None else abs(np.log(carried / mass)))
+            if best is None or off < best[0]:
                 what = "axial force" if kind == "axial" else kind
                 text = f"the {what} is {factor:g} times what the bearing has: it looks like {unit} with another unit"
                 best = (off, dict.fromkeys(names, 1.0 / factor), f"{text} named", factor)

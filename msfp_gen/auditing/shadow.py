@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from msfp_gen.auditing.columns import read_histories
+from msfp_gen.auditing.checks import INCONSISTENT
+from msfp_gen.auditing.columns import histories_from
 from msfp_gen.auditing.corrections import corrected
-from msfp_gen.auditing.histories import Histories, histories_of
+from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.stated import Stated, stated_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
@@ -120,7 +121,7 @@ class Shadow:
                 one.effect,
                 f"{100 * one.before:.3g} %",
                 f"{100 * (one.after or 0.0):.3g} %",
-                "the element has it not",
+                "the element does not have it",
             )
             for one in self.left_out
         ]
@@ -156,12 +157,7 @@ def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | 
     the model cannot follow the motion.
     """
     stated = stated_of(bearing)
-    if isinstance(source, Histories):
-        given = source
-    elif isinstance(source, str | Path):
-        given = read_histories(source, columns)
-    else:
-        given = histories_of(source)
+    given = histories_from(source, columns)
     if missing := given.missing("displacement", "force", "axial"):
         raise InputError(f"{given.name}: no column {missing[0]}; a shadow needs displacement, force and axial")
     data, found = corrected(given, stated)
@@ -179,7 +175,7 @@ def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | 
     others = [np.sqrt(np.mean(np.sum((_force(one, data) - force) ** 2, axis=1))) for one in (finer, coarser)]
     error = float(np.hypot(others[0], others[1] / 3.0)) / largest
     left_out = tuple(_left_out(scene, result, data, error))
-    notes = [reading.sentence for reading in found.values()]
+    notes = [reading.sentence for reading in found.values() if reading.verdict == INCONSISTENT]
     low = data.axial < LEAST_LOAD * data.at_rest
     if low[data.moved_at() :].any():
         span = float((np.gradient(data.time) * low).sum())
@@ -246,7 +242,7 @@ def _variants(scene: Scene, result: Result, data: Histories) -> Iterator[tuple[s
     if np.any(result.history.rim_force > 0):
         yield "rims", lambda one: one.with_effects(rims=False)
     if scene.bearing.layout.n > 3:
-        yield "stages", lambda one: at_fidelity(one, "equivalent")
+        yield "sliding regimes", lambda one: replace(at_fidelity(one, "equivalent"), duration=one.end)
 
 
 def _left_out(scene: Scene, result: Result, data: Histories, error: float) -> Iterator[LeftOut]:

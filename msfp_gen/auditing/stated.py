@@ -183,19 +183,16 @@ def stated_of(source: Any) -> Stated:
     """The data of a bearing: of a `Bearing`, a `Scene`, or the file of one or of a data sheet. Raises InputError."""
     if isinstance(source, Bearing):
         return Stated("bearing", source, _law(source))
-    if isinstance(source, Scene):
-        scene = source
-    else:
+    scene = source
+    if not isinstance(scene, Scene):
         table, path = scene_table(source)
         with prefixed(f"{path or source}: "):
-            if "motion" not in table and isinstance(table.get("bearing"), dict | str):
-                bearing = bearing_from_table(table["bearing"]) if isinstance(table["bearing"], dict) else None
-                if bearing is not None:
-                    return Stated(str(table.get("name") or path), bearing, _law(bearing))
-            found = scene_of(table, None if path is None else path.parent)
-            if not isinstance(found, Scene):
+            if "motion" not in table and isinstance(table.get("bearing"), dict):
+                bearing = bearing_from_table(table["bearing"])
+                return Stated(str(table.get("name") or path), bearing, _law(bearing))
+            scene = scene_of(table, None if path is None else path.parent)
+            if not isinstance(scene, Scene):
                 raise InputError("this has more than one bearing; give a scene or a data sheet of one bearing")
-            scene = found
     mass = scene.top.mass if isinstance(scene.top, MassTop) else None
     law = scene.law[1]
     if law is not None and law.word == "pv" and scene.effects.friction is None:

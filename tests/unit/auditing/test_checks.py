@@ -1,0 +1,148 @@
+"""What the checks say of histories by hand, of one pendulum in rigid-plastic friction under a constant axial force."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.audits import WEIGHT, rows_of, shaken, with_columns, with_force
+
+from msfp_gen import InputError, audit
+from msfp_gen.auditing import Histories
+from msfp_gen.auditing.checks import CHECKS, CONSISTENT, INCONSISTENT, OPEN, Case
+from msfp_gen.auditing.corrections import corrected
+from msfp_gen.auditing.stated import stated_of
+
+SCENE = shaken()
+STATED = stated_of(SCENE)
+MASS = WEIGHT / SCENE.bearing.gravity
+TIME = np.arange(0.0, 20.0, 0.01)
+
+
+def pendulum(time=TIME, u=None):
+    """The histories of the pendulum of `shaken`, along one axis."""
+    u = 0.25 * np.sin(1.5 * time) * np.minimum(1.0, time / 4.0) if u is None else u
+    force = WEIGHT * (u / STATED.radius + STATED.friction * np.tanh(np.gradient(u, time) / 0.005))
+    return Histories("by hand", {"time": time, "displacement_1": u, "force_1": force, "axial": WEIGHT + 0 * time})
+
+
+def without(data, name):
+    return replace(data, columns={n: values for n, values in data.columns.items() if n != name})
+
+
+def finding(data, check, scene=SCENE):
+    return audit(data, scene).finding(check)
+
+
+def test_the_pendulum_is_sound():
+    assert not audit(pendulum(), SCENE).inconsistent
+
+
+def test_a_force_that_does_not_rise_has_no_radius():
+    data = pendulum()
+    flat = with_force(data, 1.0, -2.0 * WEIGHT * data.displacement / STATED.radius)
+    found = audit(flat, SCENE)
+    assert found.finding("radius").verdict == INCONSISTENT and found.finding("radius").value is None
+    assert "does not rise with displacement" in found.finding("radius").sentence
+    json.dumps(found.as_dict, allow_nan=False)
+
+
+def test_the_mass_of_a_scene_is_on_one_bearing():
+    seventy = replace(pendulum(), bearings=70.0)
+    assert finding(seventy, "weight").verdict == CONSISTENT
+    assert finding(replace(seventy, mass=70.0 * MASS), "weight").verdict == CONSISTENT
+    assert finding(replace(seventy, mass=MASS), "weight").value == pytest.approx(70.0)
+
+
+def test_a_record_that_returns_to_the_centre_has_its_signs():
+    """Curvature gives back more than friction takes up, in any unit; a force that is turned is still named."""
+    time = np.arange(0.0, 4.0, 0.01)
+    back = pendulum(time, 0.15 * (1.0 + np.cos(np.pi * time / 4.0)))
+    low = with_force(back, 1.0, 0.6 * WEIGHT * STATED.friction * np.array([[1.0, 0.0]]) * (time < 10)[:, None])
+    for data in (back, low):
+        assert finding(data, "signs").verdict == CONSISTENT
+    for unit in (1.0, 1e3):
+        assert finding(pendulum().scaled({"displacement_1": unit}), "signs").verdict == CONSISTENT
+        turned = pendulum().scaled({"displacement_1": unit, "force_1": -1.0})
+        assert "opposite signs" in finding(turned, "signs").sentence
+
+
+def test_the_sentence_of_signs_says_what_was_seen():
+    assert "compression" in finding(pendulum(), "signs").sentence
+    found = finding(without(pendulum(), "axial"), "signs")
+    assert found.verdict == CONSISTENT and "axial" not in found.sentence
+
+
+def test_sizes_that_no_unit_explains_are_not_consistent():
+    found = finding(with_force(pendulum(), 5.0), "units")
+    assert found.verdict == OPEN and found.value > 3.0 and "no other unit" in found.sentence
+    assert finding(pendulum(), "units").verdict == CONSISTENT
+
+
+@pytest.mark.parametrize("mass", [MASS, None])
+def test_units_of_force_and_axial_force_are_told_apart_by_the_weight(mass):
+    """Of F/N alone, kilonewtons of the one are meganewtons of the other."""
+    stated = replace(STATED, mass=mass)
+    for name, words in (("force_1", "the force is 0.001 times"), ("axial", "the axial force is 0.001 times")):
+        sentence = corrected(pendulum().scaled({name: 1e-3}), stated)[1]["units"].sentence
+        assert words in sentence or (mass is None and name == "axial" and "the force is 1000 times" in sentence)
+
+
+def test_friction_that_falls_with_velocity_is_no_damping():
+    data = pendulum()
+    rate = 0.2 * WEIGHT * STATED.friction / np.abs(data.velocity).max()
+    falls = finding(with_force(data, 1.0, -rate * data.velocity), "damping")
+    assert falls.verdict == INCONSISTENT and falls.value == pytest.approx(-20.0, rel=0.1)
+    assert "falls with velocity" in falls.sentence and "-" not in falls.sentence and "damping" not in falls.sentence
+    rises = finding(with_force(data, 1.0, rate * data.velocity), "damping")
+    assert rises.value == pytest.approx(20.0, rel=0.1) and "damping of the structure" in rises.sentence
+
+
+def test_a_constant_column_is_not_cut_off():
+    found = finding(pendulum(), "clipped")
+    assert found.verdict == CONSISTENT and "cut off" in found.sentence and "stays" not in found.sentence
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_line_of_the_mass_follows_the_sign_of_the_force(sign):
+    data = pendulum()
+    drawn = finding(with_columns(data, acceleration_1=sign * data.columns["force_1"] / MASS), "mass")
+    _, (_, acceleration, line) = drawn.drawing.curves
+    assert drawn.verdict == CONSISTENT and drawn.value == pytest.approx(MASS, rel=1e-6)
+    assert line == pytest.approx(sign * MASS * acceleration, rel=1e-3)
+
+
+def test_a_small_vertical_acceleration_is_too_little():
+    wave = np.sin(9.0 * TIME)
+    calm = with_columns(pendulum(), axial=WEIGHT + MASS * 0.01 * wave, acceleration_3=0.01 * wave)
+    found = finding(calm, "vertical_mass")
+    assert found.verdict == OPEN and "too little" in found.sentence
+    other = with_columns(pendulum(), axial=WEIGHT * (1 + 0.1 * wave), acceleration_3=np.cos(7.0 * TIME))
+    found = finding(other, "vertical_mass")
+    assert found.verdict == OPEN and "does not follow" in found.sentence
+
+
+def test_the_sentence_of_energy_states_what_is_permitted():
+    """A hundredth of the loss, and what is stored, of a force that pushes for a moment."""
+    data = pendulum()
+    lost = finding(data, "energy").value
+    assert "1 % of the loss" in finding(data, "energy").sentence
+    for share, verdict in ((0.5, CONSISTENT), (4.0, INCONSISTENT)):
+        pushing = (TIME > 12.0) & (np.abs(data.displacement[:, 0]) < 0.05)
+        reach = 0.01 * share * lost / 0.1
+        pushed = np.where(pushing & (TIME < 13.0), 1.0, 0.0)[:, None] * np.sign(data.velocity) * -reach
+        found = finding(with_force(data, 1.0 - 1.0 * (pushed[:, 0] != 0), pushed), "energy")
+        assert found.verdict == verdict, found.sentence
+
+
+def test_a_map_is_for_a_file():
+    with pytest.raises(InputError, match="only a file needs a map"):
+        audit(pendulum(), SCENE, {"columns": {"time": "t [s]"}})
+
+
+def test_every_check_of_a_few_rows_answers():
+    data, found = corrected(rows_of(pendulum(), 40), STATED)
+    case = Case(data, STATED, data, found)
+    assert all(check(case).sentence for _, check in CHECKS.values())
