@@ -18,7 +18,9 @@ import numpy as np
 from drawing import Array
 from scipy.optimize import brentq
 
-from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top, simulate
+from msfp_gen import Bearing, Body, Effects, Layout, Load, Motion, Scene, Solver, Surface, Top, simulate
+from msfp_gen.auditing import read_histories
+from msfp_gen.auditing.stated import stated_of
 from msfp_gen.scene.fidelity import series_links
 from msfp_gen.scene.scene_fields import InitialState
 from msfp_gen.studies.accuracy.series import YIELD as LEAST_YIELD
@@ -26,6 +28,7 @@ from msfp_gen.studies.accuracy.series import run_opensees
 from msfp_gen.studies.accuracy.timed_run import comparison_times
 
 DATA = Path(__file__).with_name("data")
+MAT = DATA.parents[1] / "examples" / "basemat"
 SLIDER = 0.2  # radius [m] of the bearing of MASTODON
 RADIUS, MU, WEIGHT = 2.2352, 0.06, 6285710.0
 STIFFNESS = 50e6 * np.pi * SLIDER**2 * MU / 1e-3  # of its shear before sliding [N/m]
@@ -139,6 +142,23 @@ def mastodon_seismic() -> Iterator[Series]:
         points = [Point(f"{given['time'][i]:.3f} s", reference[i], float(ours[i])) for i in range(5, len(time))]
         name = f"isolator below 641 t, three axes, {axis}"
         yield Series(name, "MASTODON, gold table", "program", "force [N]", points)
+
+
+def mat_on_pendulums(inertia: float) -> tuple[Array, Array, Array]:
+    """Time [s], and displacement [m] of one bearing of a published plant by MASTODON and by a run, (T,) each.
+
+    inertia: how many times the mass of the mat acts; its weight acts once.
+    """
+    data, bearing = read_histories(MAT / "case1.csv", MAT / "map.toml"), stated_of(MAT / "bearing.toml").bearing
+    assert data.mass is not None
+    ground, mass = data.columns["base_acceleration_1"], data.mass / data.bearings
+    motion = Motion.from_acceleration(data.time, np.column_stack([ground, 0 * ground, 0 * ground]))
+    effects = Effects(dimension="planar", rims=False, friction="pv", sliders="massless")
+    load = Load.constant((0.0, 0.0, (inertia - 1.0) * mass * bearing.gravity))
+    top = Top.mass(inertia * mass, 1e-3, 0.0)
+    history = simulate(Scene(bearing, motion, top, effects, Solver(rtol=1e-5), output_step=0.01, load=load)).history
+    ours = np.interp(data.time, history.time, history.displacement[:, 0])
+    return data.time, data.columns["displacement_1"], ours
 
 
 def point_on_a_dish(radius: float, friction: float, capacity: float, yielding: float = 1e-5) -> Bearing:

@@ -91,7 +91,7 @@ class Case(NamedTuple):
 
 def cases(opensees: bool = True) -> list[Case]:
     """All rows; without those of OpenSees where it is not to be run."""
-    found = [*table_42(), *loops(), *stiff(), *device_pushes(), *laws(), *heating(), *pendulum()]
+    found = [*table_42(), *loops(), *stiff(), *device_pushes(), *laws(), *heating(), *pendulum(), *plant()]
     return [*found, *programs()] if opensees else found
 
 
@@ -228,6 +228,16 @@ def manual_scene() -> Scene:
         Effects(dimension="planar", sliders="massless"),
         name="example of the manual of OpenSees",
     )
+
+
+def plant() -> Iterator[Case]:
+    """A mat on seventy pendulums by MASTODON (docs/audit.md), with inertia twice as its input has it."""
+    _, theirs, ours = external.mat_on_pendulums(2.0)
+    for sign, quantity in ((1, "largest u [mm]"), (-1, "largest -u [mm]")):
+        numbers = [1e3 * float((sign * u).max()) for u in (theirs, ours)]
+        yield Case(
+            "mat on pendulums, inertia twice", "MASTODON, Virtual Test Bed", "program", quantity, *numbers, 1, SCRIPT
+        )
 
 
 def programs() -> Iterator[Case]:

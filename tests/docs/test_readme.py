@@ -58,7 +58,7 @@ def test_every_page_is_linked_and_every_link_leads_somewhere():
     for page in pages:
         for link in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             assert link.startswith("http") or (page.parent / link).exists(), f"{page.name}: {link}"
-    linked = set(re.findall(r"\(docs/(\w+)\.md", README)) | set(re.findall(r"\((\w+)\.md", PAGES))
+    linked = set(re.findall(r"\(docs/(\w+)\.md", README)) | set(re.findall(r"\(([\w-]+)\.md", PAGES))
     assert linked == {page.stem for page in ROOT.glob("docs/*.md")}
 
 

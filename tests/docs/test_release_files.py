@@ -27,8 +27,8 @@ FIGURES = {
     "33 ms at a tolerance of 3e-2, with a force error of 0.25 %": ("performance", "33 ms at 3e-2, error 0.25 %"),
     "in 30 cases": ("verification", "30 cases contain every value of every effect"),
     "within 0.2 of theory": ("verification", "observed orders are within 0.2 of it"),
-    "1826 comparisons": ("validation", "1826 comparisons"),
-    "1765 of them": ("validation", "1765 of them within the tolerance"),
+    "1828 comparisons": ("validation", "1828 comparisons"),
+    "1767 of them": ("validation", "1767 of them within the tolerance"),
     "hundreds to thousands of hertz": ("faq", "hundreds to thousands of hertz"),
 }
 
