@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from msfp_gen.auditing.checks import CHECKS, CONSISTENT, INCONSISTENT, OPEN, Case, Finding
+from msfp_gen.auditing.checks import CHECKS, CONSISTENT, INCONSISTENT, OPEN, AuditCase, Finding
 from msfp_gen.auditing.columns import histories_from, read_histories
 from msfp_gen.auditing.corrections import corrected
 from msfp_gen.auditing.histories import Histories
@@ -106,6 +106,6 @@ def audit(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | N
     stated = stated_of(bearing)
     given = histories_from(source, columns)
     data, found = corrected(given, stated)
-    case = Case(given, stated, data, found)
+    case = AuditCase(given, stated, data, found)
     findings = tuple(Finding(key, title, *check(case)) for key, (title, check) in CHECKS.items())
     return Audit(given.name, stated.name, findings)

@@ -85,7 +85,7 @@ class Finding:
         return {name: getattr(self, name) for name in names}
 
 
-class Reading(NamedTuple):
+class Answer(NamedTuple):
     """The answer of a check, without its name: as of `Finding`."""
 
     verdict: str
@@ -97,13 +97,13 @@ class Reading(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Case:
+class AuditCase:
     """What a check reads: histories as given, the data of the bearing, and histories with units and signs put right."""
 
     given: Histories
     stated: Stated
     data: Histories
-    corrections: dict[str, Reading]
+    corrections: dict[str, Answer]
 
     @cached_property
     def sliding(self) -> Sliding:
@@ -121,33 +121,33 @@ class Case:
         return stated_mass(self.given, self.stated)
 
     @cached_property
-    def lean(self) -> Array:
+    def shear_ratio(self) -> Array:
         """Horizontal force over axial force, (T, 2) [-]; 0 where it may be opening."""
         data = self.data
         closed = data.axial > CLOSED * data.at_rest
         return np.where(closed[:, None], data.force / np.where(closed, data.axial, 1.0)[:, None], 0.0)
 
-    def lacks(self, *names: str) -> Reading | None:
+    def lacks(self, *names: str) -> Answer | None:
         """The answer where columns are missing."""
         if missing := self.data.missing(*names):
-            return Reading(OPEN, f"no column {' and '.join(missing)}; with it this can be decided")
+            return Answer(OPEN, f"no column {' and '.join(missing)}; with it this can be decided")
         return None
 
-    def fitted(self, name: str) -> Factor | Reading:
+    def fitted(self, name: str) -> Factor | Answer:
         """A fitted factor, or the answer where there is none."""
         if lack := self.lacks("displacement", "force", "axial"):
             return lack
         if not self.sliding.enough:
-            return Reading(OPEN, self.sliding.lack)
+            return Answer(OPEN, self.sliding.lack)
         factor = self.sliding.fit.factors.get(name)
         if factor is None:
-            return Reading(OPEN, "its part of the force is too small in these data")
+            return Answer(OPEN, "its part of the force is too small in these data")
         if name in ("radius", "friction") and ERRORS * factor.error > UNSURE:
             text = (
                 f"it is known to {100 * ERRORS * factor.error:.2g} % only, since these strokes are "
                 "alike; longer ones would decide"
             )
-            return Reading(OPEN, text)
+            return Answer(OPEN, text)
         return factor
 
 
@@ -163,13 +163,13 @@ def thinned(values: Array) -> Array:
     return values[:: -(-len(values) // SHOWN)]
 
 
-def _loop(case: Case, row: int | None = None) -> Drawing:
+def _loop(case: AuditCase, row: int | None = None) -> Drawing:
     """Force over axial force against displacement, along the largest displacement, with the stated bounds."""
     data = case.data
     peak = int(np.hypot(*data.displacement.T).argmax())
     size = float(np.hypot(*data.displacement[peak])) or 1.0
     axis = data.displacement[peak] / size if size else np.array([1.0, 0.0])
-    u, f = data.displacement @ axis, case.lean @ axis
+    u, f = data.displacement @ axis, case.shear_ratio @ axis
     ends = np.array([u.min(), u.max()])
     bounds = [("stated", ends, ends / case.stated.radius + sign * case.stated.friction) for sign in (1, -1)]
     place = None if row is None else (1e3 * float(u[row]), float(f[row]))
@@ -182,7 +182,7 @@ def _course(label: str, time: Array, values: Array, y: str, row: int | None = No
     return Drawing([(label, thinned(time), thinned(values))], "time [s]", y, place)
 
 
-def signs(case: Case) -> Reading:
+def signs(case: AuditCase) -> Answer:
     """Signs of force, displacement and axial force."""
     if found := case.corrections.get("signs"):
         return found
@@ -191,19 +191,19 @@ def signs(case: Case) -> Reading:
     text = "the bearing takes up work along every axis"
     if not case.lacks("axial"):
         text += ", and its axial force is a compression"
-    return Reading(CONSISTENT, text)
+    return Answer(CONSISTENT, text)
 
 
-def units(case: Case) -> Reading:
+def units(case: AuditCase) -> Answer:
     """Units of displacement, force and acceleration."""
     if found := case.corrections.get("units"):
         return found
     if lack := case.lacks("displacement", "force", "axial"):
         return lack
-    return Reading(CONSISTENT, "sizes of displacement and force are of the order that the bearing has")
+    return Answer(CONSISTENT, "sizes of displacement and force are of the order that the bearing has")
 
 
-def sampling(case: Case) -> Reading:
+def sampling(case: AuditCase) -> Answer:
     """Distance of the rows against the motion."""
     if lack := case.lacks("displacement", "force"):
         return lack
@@ -215,17 +215,17 @@ def sampling(case: Case) -> Reading:
             f"the force is straight between every {straight}th row, so that the rows were interpolated from a step of "
             f"{straight * data.step:.3g} s: velocity and friction between them are not those of the analysis"
         )
-        return Reading(INCONSISTENT, text, straight * data.step, "s")
+        return Answer(INCONSISTENT, text, straight * data.step, "s")
     if not work[-1]:
-        return Reading(OPEN, "the bearing did no work; rows of a motion would decide")
+        return Answer(OPEN, "the bearing did no work; rows of a motion would decide")
     error = abs(work[-1] - half[-1]) / abs(work[-1]) / 3.0  # of the trapezoidal rule, by Richardson
     step = np.hypot(*np.diff(data.displacement, axis=0).T)
     row = int(step.argmax())
     text = f"the work of friction by these rows, {data.step:.3g} s apart, is exact to {100 * error:.2g} %"
     if error <= COARSE:
-        return Reading(CONSISTENT, text, 100 * error, "%")
+        return Answer(CONSISTENT, text, 100 * error, "%")
     text += f"; the bearing moves up to {1e3 * step[row]:.3g} mm between two rows: export rows at a smaller step"
-    return Reading(INCONSISTENT, text, 100 * error, "%", float(data.time[row]), _loop(case, row))
+    return Answer(INCONSISTENT, text, 100 * error, "%", float(data.time[row]), _loop(case, row))
 
 
 def _work(force: Array, displacement: Array) -> Array:
@@ -248,7 +248,7 @@ def _interpolated(force: Array) -> int:
     return usual if usual >= 3 and np.mean(gaps % usual == 0) > 0.9 else 0
 
 
-def clipped(case: Case) -> Reading:
+def clipped(case: AuditCase) -> Answer:
     """Values that stop at a limit."""
     if lack := case.lacks("displacement", "force"):
         return lack
@@ -264,8 +264,8 @@ def clipped(case: Case) -> Reading:
                 "entered and left at full rate: it was cut off at a limit of the program or of the recorder"
             )
             drawing = _course(name, data.time, data.columns[name], f"{name} [{unit}]", first)
-            return Reading(INCONSISTENT, text, value, unit, float(data.time[first]), drawing)
-    return Reading(CONSISTENT, "no column is cut off at its largest or smallest value")
+            return Answer(INCONSISTENT, text, value, unit, float(data.time[first]), drawing)
+    return Answer(CONSISTENT, "no column is cut off at its largest or smallest value")
 
 
 def _plateau(data: Histories, name: str) -> tuple[int, int, float] | None:
@@ -291,12 +291,12 @@ def _plateau(data: Histories, name: str) -> tuple[int, int, float] | None:
     return None
 
 
-def weight(case: Case) -> Reading:
+def weight(case: AuditCase) -> Answer:
     """Axial force at rest against the mass."""
     if lack := case.lacks("axial"):
         return lack
     if case.mass is None:
-        return Reading(OPEN, "no mass is stated; give `mass` in the map, or a scene with a supported mass")
+        return Answer(OPEN, "no mass is stated; give `mass` in the map, or a scene with a supported mass")
     carried = case.data.at_rest * case.data.bearings / case.stated.bearing.gravity
     ratio = carried / case.mass
     count = f"{case.data.bearings:g} bearing{'s' * (case.data.bearings != 1)}"
@@ -306,9 +306,9 @@ def weight(case: Case) -> Reading:
     )
     drawing = _course("axial force", case.data.time, case.data.axial / 1e3, "axial force [kN]")
     if abs(ratio - 1.0) <= WEIGHT_FLOOR:
-        return Reading(CONSISTENT, text, ratio, NONE)
+        return Answer(CONSISTENT, text, ratio, NONE)
     hint = f": {_multiple(ratio)} of the bearings, or of the mass, took part" if _multiple(ratio) else ""
-    return Reading(INCONSISTENT, f"{text}, {ratio:.3g} of it{hint}", ratio, NONE, None, drawing)
+    return Answer(INCONSISTENT, f"{text}, {ratio:.3g} of it{hint}", ratio, NONE, None, drawing)
 
 
 def _multiple(ratio: float) -> str:
@@ -316,20 +316,20 @@ def _multiple(ratio: float) -> str:
     return next((word for value, word in MULTIPLES.items() if abs(ratio / value - 1) < WEIGHT_FLOOR), "")
 
 
-def mass(case: Case) -> Reading:
+def mass(case: AuditCase) -> Answer:
     """Inertia: shear over acceleration against the weight."""
     if lack := case.lacks("force", "axial"):
         return lack
     found = case.momentum
     if found is None:
-        return Reading(OPEN, "no column acceleration of the supported mass, nor its position; with one this is decided")
+        return Answer(OPEN, "no column acceleration of the supported mass, nor its position; with one this is decided")
     if not found.one_mass:
         text = (
             f"force and acceleration are proportional only to {100 * found.correlation**2:.3g} % "
             "(squared correlation): "
             "the acceleration is not that of all the mass above; a column of the mean acceleration would decide"
         )
-        return Reading(OPEN, text, found.correlation**2, NONE)
+        return Answer(OPEN, text, found.correlation**2, NONE)
     carried = case.data.at_rest * case.data.bearings / case.stated.bearing.gravity
     expected, source = (carried, "the weight on the bearings") if case.mass is None else (case.mass, "the mass stated")
     implied, ratio = found.mass, found.mass / carried
@@ -343,24 +343,24 @@ def mass(case: Case) -> Reading:
         (float(found.acceleration[found.row]), float(found.force[found.row])), True,
     )  # fmt: skip
     if abs(ratio - 1.0) <= FLOOR + found.error:
-        return Reading(CONSISTENT, text, implied, "kg", None, drawing)
+        return Answer(CONSISTENT, text, implied, "kg", None, drawing)
     hint = {TWICE: "inertia acts twice", HALF: "half of the inertia acts"}.get(_multiple(ratio), "")
     hint = hint or f"the inertia that acts is {ratio:.3g} of what the weight has"
-    return Reading(INCONSISTENT, f"{text}: {hint}", implied, "kg", found.time, drawing)
+    return Answer(INCONSISTENT, f"{text}: {hint}", implied, "kg", found.time, drawing)
 
 
-def vertical_mass(case: Case) -> Reading:
+def vertical_mass(case: AuditCase) -> Answer:
     """Axial force against vertical acceleration."""
     if lack := case.lacks("axial"):
         return lack
     data, gravity = case.data, case.stated.bearing.gravity
     found = momentum(data, vertical=True)
     if found is None:
-        return Reading(OPEN, "no column acceleration_3 or position_3 of the supported mass; with one this is decided")
+        return Answer(OPEN, "no column acceleration_3 or position_3 of the supported mass; with one this is decided")
     if found.spread < LEAST_VERTICAL * gravity:
-        return Reading(OPEN, f"the vertical acceleration is {found.spread:.2g} m/s² RMS: too little to decide")
+        return Answer(OPEN, f"the vertical acceleration is {found.spread:.2g} m/s² RMS: too little to decide")
     if not found.one_mass:
-        return Reading(
+        return Answer(
             OPEN,
             "the axial force does not follow this vertical acceleration; that of the mass on this bearing would decide",
         )
@@ -373,12 +373,10 @@ def vertical_mass(case: Case) -> Reading:
         [("windows", found.acceleration, found.force)], "vertical acceleration [m/s²]", "axial force [N]", None, True
     )
     close = abs(ratio - 1.0) <= FLOOR + found.error
-    return Reading(
-        CONSISTENT if close else INCONSISTENT, text, found.mass, "kg", None if close else found.time, drawing
-    )
+    return Answer(CONSISTENT if close else INCONSISTENT, text, found.mass, "kg", None if close else found.time, drawing)
 
 
-def tension(case: Case) -> Reading:
+def tension(case: AuditCase) -> Answer:
     """Tension of the bearing."""
     if lack := case.lacks("axial"):
         return lack
@@ -387,7 +385,7 @@ def tension(case: Case) -> Reading:
     least = float(data.axial[row])
     drawing = _course("axial force", data.time, data.axial / 1e3, "axial force, compression positive [kN]", row)
     if least >= -NO_TENSION * data.at_rest:
-        return Reading(
+        return Answer(
             CONSISTENT,
             f"the least axial force is a compression of {_si(abs(max(least, 0.0)), 'N')}",
             least,
@@ -402,10 +400,10 @@ def tension(case: Case) -> Reading:
         "surfaces transmit none "
         "and would have opened"
     )
-    return Reading(INCONSISTENT, text, least, "N", float(data.time[row]), drawing)
+    return Answer(INCONSISTENT, text, least, "N", float(data.time[row]), drawing)
 
 
-def friction_bound(case: Case) -> Reading:
+def friction_bound(case: AuditCase) -> Answer:
     """Force against the largest that friction and curvature give."""
     if lack := case.lacks("displacement", "force", "axial"):
         return lack
@@ -413,7 +411,7 @@ def friction_bound(case: Case) -> Reading:
     size = np.hypot(*data.displacement.T)
     judged = (data.axial > CLOSED * data.at_rest) & (size < NEAR_RIM * stated.first_rim)
     if judged.sum() < 2:
-        return Reading(OPEN, "the slider is at its rims in all rows; rows of smaller displacement would decide")
+        return Answer(OPEN, "the slider is at its rims in all rows; rows of smaller displacement would decide")
     needed = _needed(case)
     most = float(case.sliding.law.cold[judged].max())
     # Theories of large angles differ by as much as the slope of the dish by sine and by tangent.
@@ -425,25 +423,25 @@ def friction_bound(case: Case) -> Reading:
         f"force and displacement need a friction coefficient of up to {value:.4g}; the bearing has at most {most:.4g}"
     )
     if beyond[row] <= most * (1.0 + BOUND_FLOOR):
-        return Reading(CONSISTENT, text, value, NONE, float(data.time[row]), _loop(case, row))
-    return Reading(INCONSISTENT, text, value, NONE, float(data.time[row]), _loop(case, row))
+        return Answer(CONSISTENT, text, value, NONE, float(data.time[row]), _loop(case, row))
+    return Answer(INCONSISTENT, text, value, NONE, float(data.time[row]), _loop(case, row))
 
 
-def _needed(case: Case) -> Array:
+def _needed(case: AuditCase) -> Array:
     """Friction coefficient that every row needs at least, by small or by large angles, (T,) [-]."""
     data, radius = case.data, case.stated.radius
     tilt = np.arcsin(np.clip(np.hypot(*data.displacement.T) / radius, 0.0, 0.9))
-    small = case.lean - data.displacement / radius
-    large = (case.lean - data.displacement / radius / np.cos(tilt)[:, None]) * np.cos(tilt)[:, None]
-    large = large / np.hypot(1.0, np.hypot(*case.lean.T))[:, None]
+    small = case.shear_ratio - data.displacement / radius
+    large = (case.shear_ratio - data.displacement / radius / np.cos(tilt)[:, None]) * np.cos(tilt)[:, None]
+    large = large / np.hypot(1.0, np.hypot(*case.shear_ratio.T))[:, None]
     least: Array = np.minimum(np.hypot(*small.T), np.hypot(*large.T))
     return least
 
 
-def friction(case: Case) -> Reading:
+def friction(case: AuditCase) -> Answer:
     """Friction coefficient while sliding, against the law."""
     factor = case.fitted("friction")
-    if isinstance(factor, Reading):
+    if isinstance(factor, Answer):
         return factor
     sliding, stated = case.sliding, case.stated
     low, high = np.quantile(sliding.implied, [0.05, 0.95])
@@ -458,7 +456,7 @@ def friction(case: Case) -> Reading:
         "time [s]", "friction coefficient", None, True,
     )  # fmt: skip
     if factor.agrees(1.0, FLOOR):
-        return Reading(CONSISTENT, text, factor.value, NONE, None, drawing)
+        return Answer(CONSISTENT, text, factor.value, NONE, None, drawing)
     ratio = stated.pivot_ratio
     hints = {
         ratio: "as if the coefficients of the surfaces acted at the pivot, without the lever arm of its height",
@@ -468,38 +466,38 @@ def friction(case: Case) -> Reading:
         (words for at, words in hints.items() if abs(at - 1.0) > FLOOR and factor.agrees(at, 0.5 * abs(at - 1.0))), ""
     )
     worst = int(sliding.rows[np.abs(sliding.implied - sliding.law.heated[sliding.rows]).argmax()])
-    return Reading(
+    return Answer(
         INCONSISTENT, f"{text}{': ' + hint if hint else ''}", factor.value, NONE, float(case.data.time[worst]), drawing
     )
 
 
-def radius(case: Case) -> Reading:
+def radius(case: AuditCase) -> Answer:
     """Curvature: slope of the force while sliding."""
     factor = case.fitted("radius")
-    if isinstance(factor, Reading):
+    if isinstance(factor, Answer):
         return factor
     stated = case.stated.radius
     if factor.value <= 0.0:
         text = f"while sliding the force does not rise with displacement; the bearing has a radius of {stated:.4g} m"
-        return Reading(INCONSISTENT, text, None, NONE, None, _loop(case))
+        return Answer(INCONSISTENT, text, None, NONE, None, _loop(case))
     implied = stated / factor.value
     text = f"the slope of the force while sliding implies a radius of {implied:.4g} m; the bearing has {stated:.4g} m"
     good = factor.agrees(1.0, FLOOR)
-    return Reading(CONSISTENT if good else INCONSISTENT, text, implied, "m", None, _loop(case))
+    return Answer(CONSISTENT if good else INCONSISTENT, text, implied, "m", None, _loop(case))
 
 
-def heat(case: Case) -> Reading:
+def heat(case: AuditCase) -> Answer:
     """Whether friction falls as the surfaces heat."""
     if lack := case.lacks("displacement", "force", "axial"):
         return lack
     sliding = case.sliding
     if not sliding.enough:
-        return Reading(OPEN, sliding.lack)
+        return Answer(OPEN, sliding.lack)
     law, data, rows = sliding.law, case.data, sliding.rows
     if law.temperature is None:
         return _drift(case)
     if case.stated.bearing.layout.n > 3:
-        return Reading(
+        return Answer(
             OPEN, "which surfaces slide, and heat, does not follow from these columns; `msfp-gen shadow` computes it"
         )
     hottest = float(law.temperature.max())
@@ -508,7 +506,7 @@ def heat(case: Case) -> Reading:
     fall = float(1.0 - (law.heated[rows] / law.cold[rows]).min())
     factor = sliding.fit.factors.get("heat")
     if factor is None or ERRORS * factor.error > 1.0 - HEAT_FLOOR:
-        return Reading(
+        return Answer(
             OPEN,
             f"by the law the surface reaches {hottest:.0f} °C and loses {100 * fall:.2g} % of "
             "friction: too little to decide",
@@ -526,12 +524,12 @@ def heat(case: Case) -> Reading:
         "time [s]", "factor of temperature", None, True,
     )  # fmt: skip
     if factor.agrees(1.0, HEAT_FLOOR):
-        return Reading(CONSISTENT, text, factor.value, NONE, None, drawing)
+        return Answer(CONSISTENT, text, factor.value, NONE, None, drawing)
     hint = ": nothing heats" if factor.agrees(0.0, HEAT_FLOOR) else ""
-    return Reading(INCONSISTENT, text + hint, factor.value, NONE, float(data.time[law.temperature.argmax()]), drawing)
+    return Answer(INCONSISTENT, text + hint, factor.value, NONE, float(data.time[law.temperature.argmax()]), drawing)
 
 
-def _drift(case: Case) -> Reading:
+def _drift(case: AuditCase) -> Answer:
     """Change of the implied coefficient over the record, where the law has no temperature."""
     sliding = case.sliding
     work = np.cumsum(np.append(0.0, np.hypot(*np.diff(case.data.displacement, axis=0).T)))[sliding.rows]
@@ -545,17 +543,17 @@ def _drift(case: Case) -> Reading:
         "law friction does not depend on heat"
     )
     if abs(slope) <= 2 * FLOOR + 3 * error:
-        return Reading(CONSISTENT, text, float(slope), NONE)
+        return Answer(CONSISTENT, text, float(slope), NONE)
     drawing = Drawing(
         [("implied / law", case.data.time[sliding.rows], relative)], "time [s]", "friction over law", None, True
     )
-    return Reading(INCONSISTENT, text, float(slope), NONE, None, drawing)
+    return Answer(INCONSISTENT, text, float(slope), NONE, None, drawing)
 
 
-def coupling(case: Case) -> Reading:
+def coupling(case: AuditCase) -> Answer:
     """Whether the horizontal force follows the axial force at every instant."""
     factor = case.fitted("coupling")
-    if isinstance(factor, Reading):
+    if isinstance(factor, Answer):
         return factor
     data, rows = case.data, case.sliding.rows
     spread = float(np.std(data.axial[rows]) / data.at_rest)
@@ -564,9 +562,9 @@ def coupling(case: Case) -> Reading:
         f"{factor.value:.2g} of this variation"
     )
     if ERRORS * factor.error > 1.0 - COUPLING_FLOOR:
-        return Reading(OPEN, f"{text}, +- {ERRORS * factor.error:.2g}: too little to decide", factor.value, NONE)
+        return Answer(OPEN, f"{text}, +- {ERRORS * factor.error:.2g}: too little to decide", factor.value, NONE)
     if factor.agrees(1.0, COUPLING_FLOOR):
-        return Reading(CONSISTENT, text, factor.value, NONE)
+        return Answer(CONSISTENT, text, factor.value, NONE)
     worst = int(rows[np.abs(data.axial[rows] - data.at_rest).argmax()])
     hint = ": friction and stiffness are those of a constant axial force" if factor.agrees(0.0, COUPLING_FLOOR) else ""
     drawing = Drawing(
@@ -574,13 +572,13 @@ def coupling(case: Case) -> Reading:
         "time [s]", "axial force / at rest",
         (float(data.time[worst]), float(data.axial[worst] / data.at_rest)),
     )  # fmt: skip
-    return Reading(INCONSISTENT, text + hint, factor.value, NONE, float(data.time[worst]), drawing)
+    return Answer(INCONSISTENT, text + hint, factor.value, NONE, float(data.time[worst]), drawing)
 
 
-def damping(case: Case) -> Reading:
+def damping(case: AuditCase) -> Answer:
     """Force along the velocity beside friction."""
     factor = case.fitted("damping")
-    if isinstance(factor, Reading):
+    if isinstance(factor, Answer):
         return factor
     sliding, data = case.sliding, case.data
     speed = sliding.along(data.velocity)
@@ -591,21 +589,21 @@ def damping(case: Case) -> Reading:
     what = "friction is less than by the law, by" if falls else "beside friction acts a force of"
     text = f"{what} {_si(abs(factor.value), 'N s/m')} times the velocity, at most {100 * abs(share):.2g} % of friction"
     if factor.agrees(0.0, DAMPING_FLOOR * level / float(speed.max())):
-        return Reading(CONSISTENT, text, 100 * share, "%")
+        return Answer(CONSISTENT, text, 100 * share, "%")
     rises = "damping of the structure acts in the bearing, or friction rises with velocity more than the law says"
     text += f": {'friction falls with velocity more than the law says' if falls else rises}"
     curve = sliding.implied - sliding.law.heated[sliding.rows]
     drawing = Drawing([("implied - law", speed, curve)], "velocity [m/s]", "friction coefficient", None, True)
-    return Reading(INCONSISTENT, text, 100 * share, "%", float(data.time[row]), drawing)
+    return Answer(INCONSISTENT, text, 100 * share, "%", float(data.time[row]), drawing)
 
 
-def energy(case: Case) -> Reading:
+def energy(case: AuditCase) -> Answer:
     """Energy that the bearing dissipates."""
     if lack := case.lacks("displacement", "force", "axial"):
         return lack
     data, stated = case.data, case.stated
     if np.hypot(*data.displacement.T).max() > NEAR_RIM * stated.first_rim:
-        return Reading(OPEN, "rims store energy too, which these columns do not tell apart; `msfp-gen shadow` does")
+        return Answer(OPEN, "rims store energy too, which these columns do not tell apart; `msfp-gen shadow` does")
     spring = data.axial[:, None] * data.displacement / stated.radius
     lost = _work(data.force - spring, data.displacement)
     coarse = np.interp(data.time, data.time[::2], _work((data.force - spring)[::2], data.displacement[::2]))
@@ -625,23 +623,23 @@ def energy(case: Case) -> Reading:
     )
     drawing = _course("dissipated", data.time, lost / 1e3, "dissipated [kJ]", row)
     if back[row] <= permitted:
-        return Reading(CONSISTENT, text, float(lost[-1]), "J", None, drawing)
-    return Reading(INCONSISTENT, text + ": it makes energy", float(-back[row]), "J", float(data.time[row]), drawing)
+        return Answer(CONSISTENT, text, float(lost[-1]), "J", None, drawing)
+    return Answer(INCONSISTENT, text + ": it makes energy", float(-back[row]), "J", float(data.time[row]), drawing)
 
 
-def chatter(case: Case) -> Reading:
+def chatter(case: AuditCase) -> Answer:
     """Irregular force while sliding."""
     if lack := case.lacks("displacement", "force", "axial"):
         return lack
     sliding, data = case.sliding, case.data
     if not sliding.enough:
-        return Reading(OPEN, sliding.lack)
+        return Answer(OPEN, sliding.lack)
     rows = sliding.rows
     relative = sliding.implied / max(float(sliding.law.cold[rows].mean()), 1e-12)
     whole = (np.diff(rows[:-1]) == 1) & (np.diff(rows[1:]) == 1)
     bends = ((relative[2:] - 2 * relative[1:-1] + relative[:-2]) / 2.0)[whole]
     if len(bends) < 10:
-        return Reading(OPEN, "strokes of three rows and more would decide")
+        return Answer(OPEN, "strokes of three rows and more would decide")
     middle = rows[1:-1][whole]
     rough, worst = float(np.sqrt(np.mean(bends**2))), int(np.abs(bends).argmax())
     usual = float(np.median(np.abs(bends)))
@@ -653,7 +651,7 @@ def chatter(case: Case) -> Reading:
         f"{100 * most:.2g} % at most"
     )
     if rough > ROUGH and usual > 0.2 * rough:
-        return Reading(
+        return Answer(
             INCONSISTENT,
             f"{text}: it chatters at the step of the rows, above {0.25 / data.step:.3g} Hz",
             100 * rough,
@@ -663,13 +661,13 @@ def chatter(case: Case) -> Reading:
         )
     if most > max(SPIKE, 8 * usual):
         count = int((np.abs(bends) > max(SPIKE, 8 * usual)).sum())
-        return Reading(
+        return Answer(
             INCONSISTENT, f"{text}: {count} spike{'s' * (count > 1)} of single rows", 100 * most, "%", time, drawing
         )
-    return Reading(CONSISTENT, text, 100 * rough, "%")
+    return Answer(CONSISTENT, text, 100 * rough, "%")
 
 
-def travel(case: Case) -> Reading:
+def travel(case: AuditCase) -> Answer:
     """Displacement against the rims."""
     if lack := case.lacks("displacement"):
         return lack
@@ -682,8 +680,8 @@ def travel(case: Case) -> Reading:
     )
     drawing = _course("displacement", data.time, 1e3 * size, "displacement [mm]", row)
     if size[row] <= stated.capacity * (1 + BOUND_FLOOR):
-        return Reading(CONSISTENT, text, float(size[row]), "m", float(data.time[row]), drawing)
-    return Reading(
+        return Answer(CONSISTENT, text, float(size[row]), "m", float(data.time[row]), drawing)
+    return Answer(
         INCONSISTENT,
         f"{text}: the rims were left out, or have no stiffness",
         float(size[row]),
@@ -693,19 +691,19 @@ def travel(case: Case) -> Reading:
     )
 
 
-def lift(case: Case) -> Reading:
+def lift(case: AuditCase) -> Answer:
     """Rise of the mass on the dish."""
     if lack := case.lacks("displacement"):
         return lack
     data, stated = case.data, case.stated
     if "rise" not in data.columns:
-        return Reading(OPEN, "no column rise, of the upper plate against the lower one; with it this can be decided")
+        return Answer(OPEN, "no column rise, of the upper plate against the lower one; with it this can be decided")
     size = np.hypot(*data.displacement.T)
     expected = size**2 / (2 * stated.radius)
     row = int(expected.argmax())
     rise = data.columns["rise"] - data.columns["rise"][0]
     if expected[row] < 1e-4 or np.std(rise) == 0 == np.std(expected):
-        return Reading(OPEN, f"the mass rises by {1e3 * expected[row]:.2g} mm at most: too little to decide")
+        return Answer(OPEN, f"the mass rises by {1e3 * expected[row]:.2g} mm at most: too little to decide")
     slope = float(np.polyfit(expected, rise, 1)[0])
     text = f"on the dish the mass rises by {1e3 * expected[row]:.3g} mm, u²/(2 L); the data have {slope:.2g} of it"
     drawing = Drawing(
@@ -717,8 +715,8 @@ def lift(case: Case) -> Reading:
     )  # fmt: skip
     # Of links that tilt by different angles the rise is larger than of one; lifted surfaces raise it too.
     if slope >= 0.5:
-        return Reading(CONSISTENT, text, slope, NONE, float(data.time[row]), drawing)
-    return Reading(
+        return Answer(CONSISTENT, text, slope, NONE, float(data.time[row]), drawing)
+    return Answer(
         INCONSISTENT,
         f"{text}: the vertical motion is not coupled to the horizontal one",
         slope,
@@ -736,7 +734,7 @@ def _si(value: float, unit: str) -> str:
     return f"{value:.4g} {unit}"
 
 
-Check = Callable[[Case], Reading]
+Check = Callable[[AuditCase], Answer]
 CHECKS: dict[str, tuple[str, Check]] = {
     "signs": ("signs of force, displacement and axial force", signs),
     "units": ("units", units),

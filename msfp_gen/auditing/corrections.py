@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from msfp_gen.auditing.checks import INCONSISTENT, OPEN, Reading, stated_mass
+from msfp_gen.auditing.checks import INCONSISTENT, OPEN, Answer, stated_mass
 from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.momentum import momentum
 from msfp_gen.auditing.sliding import CLOSED, ERRORS, Sliding
@@ -27,16 +27,16 @@ FORCES = {
 }
 
 
-def corrected(data: Histories, stated: Stated) -> tuple[Histories, dict[str, Reading]]:
+def corrected(data: Histories, stated: Stated) -> tuple[Histories, dict[str, Answer]]:
     """Histories with signs and units put right, and what was found."""
-    found: dict[str, Reading] = {}
+    found: dict[str, Answer] = {}
     factors, texts = _signs(data)
     data = data.scaled(factors)
     if texts:
-        found["signs"] = Reading(INCONSISTENT, "; ".join(texts) + "; it is turned in what follows")
-    factors, reading = _units(data, stated)
-    if reading is not None:
-        found["units"] = reading
+        found["signs"] = Answer(INCONSISTENT, "; ".join(texts) + "; it is turned in what follows")
+    factors, answer = _units(data, stated)
+    if answer is not None:
+        found["units"] = answer
     return data.scaled(factors), found
 
 
@@ -72,10 +72,10 @@ def _ratio(data: Histories, stated: Stated) -> float:
     """How far sizes are off: 1 where force, displacement and capacity fit together."""
     size = np.hypot(*data.displacement.T)
     closed = data.axial > CLOSED * data.at_rest
-    lean = np.hypot(*data.force[closed].T) / data.axial[closed]
+    shear_ratio = np.hypot(*data.force[closed].T) / data.axial[closed]
     most = stated.friction + size[closed] / stated.radius
     inside = size[closed] < stated.first_rim
-    beyond = float((lean / np.maximum(most, 1e-12))[inside].max()) if inside.any() else 1.0
+    beyond = float((shear_ratio / np.maximum(most, 1e-12))[inside].max()) if inside.any() else 1.0
     sliding = Sliding(data, stated)
     worst = max(beyond, float(size.max()) / stated.capacity / 2.0)
     if sliding.enough:
@@ -87,20 +87,20 @@ def _ratio(data: Histories, stated: Stated) -> float:
     return worst
 
 
-def _units(data: Histories, stated: Stated) -> tuple[dict[str, float], Reading | None]:
+def _units(data: Histories, stated: Stated) -> tuple[dict[str, float], Answer | None]:
     """Factors of columns in another unit, and what was found; None where all units fit."""
     whole = not data.missing("displacement", "force", "axial") and data.at_rest > 0
     ratio = _ratio(data, stated) if whole else 1.0
     found = (_other_unit(data, stated) if ratio > FAR else None) or _other_acceleration(data, stated)
     if found is not None:
         factors, text, value = found
-        return factors, Reading(INCONSISTENT, f"{text}; it is put right in what follows", value)
+        return factors, Answer(INCONSISTENT, f"{text}; it is put right in what follows", value)
     if ratio > FAR:
         text = (
             f"sizes are off by a factor of up to {ratio:.3g} from those of the bearing, and no other unit of one "
             "quantity explains it; the other checks say what differs"
         )
-        return {}, Reading(OPEN, text, ratio)
+        return {}, Answer(OPEN, text, ratio)
     return {}, None
 
 

@@ -175,7 +175,7 @@ def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | 
     others = [np.sqrt(np.mean(np.sum((_force(one, data) - force) ** 2, axis=1))) for one in (finer, coarser)]
     error = float(np.hypot(others[0], others[1] / 3.0)) / largest
     left_out = tuple(_left_out(scene, result, data, error))
-    notes = [reading.sentence for reading in found.values() if reading.verdict == INCONSISTENT]
+    notes = [answer.sentence for answer in found.values() if answer.verdict == INCONSISTENT]
     low = data.axial < LEAST_LOAD * data.at_rest
     if low[data.moved_at() :].any():
         span = float((np.gradient(data.time) * low).sum())

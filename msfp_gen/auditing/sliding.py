@@ -153,16 +153,16 @@ class Sliding:
         data, rows, law, radius = self.histories, self.rows, self.law, self.stated.radius
         force, u, speed = self.along(data.force), self.along(data.displacement), self.along(data.velocity)
         axial, rest = data.axial[rows], data.at_rest
-        lean, arm = u / radius, np.ones_like(u)
+        restoring, arm = u / radius, np.ones_like(u)
         if large:  # the links turn by asin(u/L), and friction acts on the whole of the transmitted force
             tilt = np.arcsin(np.clip(np.hypot(*data.displacement.T)[rows] / radius, 0.0, 0.9))
-            lean, arm = lean / np.cos(tilt), np.hypot(1.0, force / axial) / np.cos(tilt)
+            restoring, arm = restoring / np.cos(tilt), np.hypot(1.0, force / axial) / np.cos(tilt)
         heat = law.heated[rows] - law.cold[rows]
         parts = {
-            "radius": rest * lean,
+            "radius": rest * restoring,
             "friction": rest * law.cold[rows] * arm,
             "heat": rest * heat * arm,
-            "coupling": (axial - rest) * (lean + law.heated[rows] * arm),
+            "coupling": (axial - rest) * (restoring + law.heated[rows] * arm),
             "damping": speed,
         }
         scale = float(np.abs(force).max())

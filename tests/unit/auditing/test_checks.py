@@ -11,7 +11,7 @@ from support.audits import WEIGHT, rows_of, shaken, with_columns, with_force
 
 from msfp_gen import InputError, audit
 from msfp_gen.auditing import Histories
-from msfp_gen.auditing.checks import CHECKS, CONSISTENT, INCONSISTENT, OPEN, Case
+from msfp_gen.auditing.checks import CHECKS, CONSISTENT, INCONSISTENT, OPEN, AuditCase
 from msfp_gen.auditing.corrections import corrected
 from msfp_gen.auditing.stated import stated_of
 
@@ -144,5 +144,5 @@ def test_a_map_is_for_a_file():
 
 def test_every_check_of_a_few_rows_answers():
     data, found = corrected(rows_of(pendulum(), 40), STATED)
-    case = Case(data, STATED, data, found)
+    case = AuditCase(data, STATED, data, found)
     assert all(check(case).sentence for _, check in CHECKS.values())
