@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from datetime import date
 from pathlib import Path
 
-from quick import OPTIONS, QUICK, docs_folder, parser, pick
+from quick import OPTIONS, QUICK, docs_folder, labelled, parser, pick
 
 from msfp_gen.common.output import replacing
 from msfp_gen.studies.accuracy.study import machine
@@ -77,7 +77,7 @@ def measure(path: Path, target: Path, run: Callable[[str], str]) -> None:
     text = filled(text, {command: run(command) for command in commands(text)}, today)
     text = STAMP.sub(lambda _: stamp(today), text)
     with replacing(target) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(labelled(text), encoding="utf-8")
 
 
 def main() -> None:

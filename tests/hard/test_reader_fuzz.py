@@ -27,6 +27,7 @@ from support import ROOT
 from support.damaged_records import CSV, MUTATIONS
 
 from msfp_gen import InputError, Motion, load_scene
+from msfp_gen.auditing.columns import read_histories
 from msfp_gen.buildings.building import matrix_of
 from msfp_gen.motions import records
 from msfp_gen.motions.records.scaling import read_spectrum
@@ -183,6 +184,16 @@ TEST = "time [s], displacement [mm], force [kN]\n" + "".join(
 FOLDER = b'name = "a"\n[about]\nruns = 4\nchunk = 2\nsamples = 0\nversion = "0.2.0"\nseconds = 0.1\n[scene]\nx = 1\n'
 SPECTRUM = b"period [s], sa [g]\n0.1, 0.5\n0.5, 1.0\n2.0, 0.3\n"
 SUITE = b'[[records]]\nbundled = "ridgecrest-2019-ci-clc"\nduration = 4.0\nname = "one"\n'
+AUDITED = b"time [s], u, fx\n" + b"".join(b"%.1f, %d, %d\n" % (0.1 * i, i % 7, i % 5) for i in range(40))
+MAP = b'mass = "5 t"\nbearings = 2\n[columns]\ntime = "time"\ndisplacement_1 = "u [mm]"\nforce_1 = "-fx [kN]"\n'
+
+
+def mapped(path: Path) -> Any:
+    """A table by the map at a path."""
+    (path.parent / "audited.csv").write_bytes(AUDITED)
+    return read_histories(path.parent / "audited.csv", path).columns.get("force_1")
+
+
 READERS: dict[str, list[Reader]] = {
     "scene/file/loader.py": [
         Reader("scene.toml", (EXAMPLES / "triple.toml").read_bytes(), load_scene, toml),
@@ -199,6 +210,12 @@ READERS: dict[str, list[Reader]] = {
     "motions/records/csv_table.py": [
         Reader("record.csv", CSV.encode(), lambda path: records.read_record(path).acceleration),
         Reader("motion.csv", b"time [s],u1 [mm]\n0,1\n1,2\n2,3\n3,1\n", lambda path: Motion.from_csv(path).duration),
+    ],
+    "auditing/columns.py": [
+        Reader("map.toml", MAP, mapped, toml),
+        Reader(
+            "audited.csv", AUDITED, lambda path: read_histories(path, tomllib.loads(MAP.decode())).columns["force_1"]
+        ),
     ],
     "motions/records/scaling.py": [Reader("target.csv", SPECTRUM, lambda path: np.array(read_spectrum(path)))],
     "studies/calibration/measurement.py": [

@@ -89,7 +89,8 @@ def test_fixed_effects_are_noted_and_end_the_run_with_the_name_of_the_bearing(fi
         simulate(rocking(fixed))
     found = caught.value.result
     notes = [note for note in found.notes if note.kind == "uplift"]
-    assert caught.value.status == "uplift" and [note.text[:10] for note in notes] == ["bearing 3:", "bearing 2:"]
+    assert caught.value.status == "uplift" and [note.text[:10] for note in notes] == ["bearing 3:"]
+    assert notes[0].text.endswith("; the same holds for 1 other bearing")
     assert all(0 < note.value < 0.05 * LOAD * 1.2 and not note.action for note in notes)
     assert notes[0].time < found.time[-1] + 0.01 and not any(each.model_changes for each in found.bearings)
 

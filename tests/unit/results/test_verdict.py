@@ -364,7 +364,7 @@ def test_tables_of_rims_name_the_surface() -> None:
     summary, printed = at_the_rims().summary, repr(at_the_rims())
     assert [one["rims_met"] for one in summary["bearings"]] == [[1, 4], [1], [1], [1, 4]]
     assert summary["bearings"][1]["peak_rim_force"][0] == pytest.approx(9211.1, rel=1e-3)
-    assert "rims met          surfaces 1, 4 of 1, 4; 1 of 2, 3" in printed
+    assert "rims met surfaces 1, 4 of 1, 4; 1 of 2, 3" in " ".join(printed.split())
     assert "rim [kN]" in "\n".join(table.text for table in at_the_rims().bearings[0].tables())
 
 
@@ -375,7 +375,8 @@ def test_a_bearing_of_a_building_has_its_own_verdict() -> None:
     assert {reading.bearing for reading in result.verdict.exceeded} == {2, 3}
     assert "bearing 2, surface 1" in result.verdict.text and "and 1 other bearing)" in result.verdict.text
     assert result.summary["verdict"]["limits"] == "rim_force" and result.summary["verdict"]["word"] == "exceeded"
-    assert "verdict           exceeded: rim force 9.208 kN, limit 8 kN (bearing 2, surface 1," in repr(result)
+    printed = " ".join(repr(result).split())
+    assert "verdict exceeded: rim force 9.208 kN, limit 8 kN (bearing 2, surface 1," in printed
     row = next(row for row in result.verdict.table.rows if row[0] == "rim force")
     assert row[1:4] == ("9.208 kN", "8 kN", "bearing 2, surface 1") and row[5] == "EXCEEDED"
     assert result.verdict.table.title.endswith("exceeded by 2 bearings")
