@@ -184,9 +184,9 @@ def test_the_plant_is_followed_with_inertia_twice():
 @pytest.mark.parametrize("axes", [(1.0, 0.0, 0.0), SPACE])
 @pytest.mark.parametrize("kind", ["single-articulated-push", "double-push", "triple-push"])
 def test_sound_results_of_stacks(law, axes, kind):
-    """Small and strong motions, and coarse rows; a triple pendulum of 150 mm is moved less."""
+    """Small and strong motions, and coarse rows; a triple pendulum of 150 mm, without rims here, is moved less."""
     changes = {"friction_slow": 0.03, "velocity_rate": 150.0} if law == "velocity" else {}
-    share = 0.25 if kind == "triple-push" else 1.0
+    share = {"pvt": 0.08}.get(law, 0.15) if kind == "triple-push" else 1.0
     for scale, step in ((0.3, 0.01), (1.0, 0.01), (1.0, 0.04)):
         choices = {"law": law, "axes": axes, "preset": kind, "scale": share * scale, "step": step, **changes}
         found = audit(run_of(**choices), shaken(**choices))
