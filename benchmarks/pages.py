@@ -32,7 +32,7 @@ PAGES = {
 }
 MARKED = re.compile(r"<!-- (python [^>\n]*?) -->\n\n?((?:\|.*\n)+)")
 TABLE = re.compile(r"^\|.*\n\|[-| :]+\|\n(?:\|.*(?:\n|$))*", re.MULTILINE)
-STAMP = re.compile(r"^Measured by `python benchmarks/pages\.py`.*$", re.MULTILINE)
+STAMP = re.compile(r"^Measured by .* on \d{4}-\d\d-\d\d: processor .*$", re.MULTILINE)
 
 
 def commands(text: str) -> list[str]:
