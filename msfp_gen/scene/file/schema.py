@@ -7,6 +7,7 @@ one line.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import MISSING
 from functools import lru_cache, partial
@@ -68,7 +69,7 @@ class Errors:
             raise InputError(self._first.get(True) or self._first[False])
 
 
-class Reader:
+class Reader(ABC):
     """What reads the value of a key. remedy: what to give where the key is missing."""
 
     remedy: str = "give this table"
@@ -77,25 +78,32 @@ class Reader:
         """The tables that it reads; of several with the words that distinguish them."""
         return ()
 
+    @abstractmethod
     def read(self, value: Any, place: Place, errors: Errors) -> Any:
         """The value in SI units; adds its errors."""
-        raise NotImplementedError
 
 
 class Value(Reader):
     """Reads a value by the `parse` of a rule, texts with units included."""
 
     def __init__(self, parse: Callable[..., Any]) -> None:
-        self.parse = parse
+        self._parse = parse
 
     @property
     def remedy(self) -> str:  # type: ignore[override]
         """That of the rule."""
         try:
-            self.parse(None, text=True)
+            self._parse(None, text=True)
         except ValueError as error:
             return str(error)
         return Reader.remedy
+
+    def read(self, value: Any, place: Place, errors: Errors) -> Any:
+        """As of `Reader`."""
+        try:
+            return self._parse(value, text=True)
+        except ValueError as error:
+            errors.add(f"{place.fact(value)}: {error}")
 
 
 class Key(NamedTuple):
@@ -129,15 +137,7 @@ class Keys(Reader):
         found = {}
         for name, (reader, default) in self.keys.items():
             if name in value:
-                try:  # most keys have values, and most of them are right: their place is not asked for
-                    found[name] = (
-                        reader.parse(value[name], text=True)
-                        if isinstance(reader, Value)
-                        else reader.read(value[name], place.key(name), errors)
-                    )
-                except ValueError as error:
-                    found[name] = None
-                    errors.add(f"{place.key(name).fact(value[name])}: {error}")
+                found[name] = reader.read(value[name], place.key(name), errors)
             elif default is MISSING and name not in absent:
                 errors.add(f"{place.key(name).path}{place.note} is missing: {reader.remedy}")
         for name in value if len(found) < len(value) else ():
@@ -176,7 +176,7 @@ class OneOf(Reader):
         word = self._word(value)
         if isinstance(word, str) and word in self.ways:
             return self.ways[word].read(value, place, errors)
-        fact = f"{place.path}.kind = {word!r}" if "kind" in value else f"{place.path}.kind is missing"
+        fact = f"{place.path}.kind = {_short(word)}" if "kind" in value else f"{place.path}.kind is missing"
         errors.add(f"{fact}: give one of {', '.join(map(repr, self.ways))}")
 
 

@@ -310,8 +310,10 @@ def test_a_row_costs_few_calls() -> None:
         nonlocal calls
         calls += event in ("call", "c_call")
 
-    for factor in (1.0, 1.1, 1.2):
-        sys.setprofile(count if factor > 1.0 else None)  # the first row loads the model
-        study.keep.values(run_to_end(factory.scene([factor])), {"friction": factor})
-    sys.setprofile(None)
+    try:
+        for factor in (1.0, 1.1, 1.2):
+            sys.setprofile(count if factor > 1.0 else None)  # the first row loads the model
+            study.keep.values(run_to_end(factory.scene([factor])), {"friction": factor})
+    finally:
+        sys.setprofile(None)
     assert calls / 2 < 3600
