@@ -13,60 +13,84 @@ import math
 import subprocess
 import sys
 import tomllib
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+from opensees_cycle import cycle
 from records import write_records
 
-from msfp_gen import Bearing, Motion, Scene, Top, simulate
-from msfp_gen.design.effective import effective, published_backbone
+from msfp_gen import Motion, Scene, Top, simulate
+from msfp_gen.design.effective import characteristic, effective, published_backbone
+from msfp_gen.scene.file.loader import load_sheet
 
 HERE = Path(__file__).parent
 DISPLACEMENT = 0.5  # at which the bearing is checked [m]
 FREQUENCY = 0.01  # of the cyclic test [Hz]; slow, as the formulas have it
-SHEET = {
-    "device": "triple",
-    "radius": [2.235, 0.406],
-    "height": [0.178, 0.045],
-    "friction": [0.06, 0.02],
-    "friction_lower": [0.045, 0.012],
-    "friction_upper": [0.085, 0.035],
-    "slider_diameter": [0.508, 0.2],
-    "dish_diameter": [1.22, 0.356],
-    "plate_height": 0.07,
-    "axial_load": 1850e3,
-}  # as in hospital.toml, in SI units
+TORSION = "16 m, 1.7 m, 34 m, 26 m"  # of `equivalent`: row of bearings farthest off, eccentricity, plan
+_, SHEET, BEARING = load_sheet(HERE / "hospital.toml")
 
 
-def by_hand() -> dict[str, float]:
-    """Effective stiffness [N/m] and damping [-] of the bilinear loop of design formulas, from six numbers."""
-    load, (outer, inner) = SHEET["axial_load"], SHEET["friction"]
-    length = [radius - height for radius, height in zip(SHEET["radius"], SHEET["height"], strict=True)]
+class Loop(NamedTuple):
+    """One cycle at DISPLACEMENT: k_eff [N/m], damping by its area, and by its force at zero displacement [-]."""
+
+    stiffness: float
+    by_area: float
+    by_height: float
+
+
+def loop(force: float, area: float, height: float) -> Loop:
+    """Of the force at DISPLACEMENT [N], the area of the loop [J] and its force at zero displacement [N]."""
+    return Loop(force / DISPLACEMENT, area / (2 * math.pi * force * DISPLACEMENT), 2 * height / (math.pi * force))
+
+
+def by_hand() -> Loop:
+    """The bilinear loop of design formulas, from seven numbers of the sheet."""
+    load, (outer, inner) = SHEET.axial_load, SHEET.friction[:2]
+    length = [radius - height for radius, height in zip(SHEET.radius[:2], SHEET.height[:2], strict=True)]
     friction = outer - (outer - inner) * length[1] / length[0]  # force over load at zero displacement
-    stiffness = load / (2 * length[0]) + friction * load / DISPLACEMENT
-    return {"k_eff": stiffness, "damping": 2 * friction * load / (math.pi * stiffness * DISPLACEMENT)}
+    force = load * DISPLACEMENT / (2 * length[0]) + friction * load
+    return loop(force, 4 * friction * load * DISPLACEMENT, friction * load)  # it slides from the first millimetre
 
 
-def by_sheet() -> dict[str, float]:
-    """The same by the published backbone with all its regimes, as `msfp-gen sheet` prints it."""
-    found = effective(published_backbone(Bearing.from_sheet(**SHEET)), DISPLACEMENT, 9.8)
-    return {"k_eff": found.stiffness * SHEET["axial_load"], "damping": found.damping}
+def by_sheet() -> Loop:
+    """The published backbone with all its regimes, as `msfp-gen sheet` prints it."""
+    backbone, load = published_backbone(BEARING), SHEET.axial_load
+    found = effective(backbone, DISPLACEMENT, BEARING.gravity)
+    return loop(found.force * load, found.energy * load, characteristic(backbone)[0] * load)
 
 
-def by_run() -> dict[str, float]:
-    """The same of a simulated test: two cycles under constant load, by the equations of motion."""
-    top = Top.rig(axial_load=SHEET["axial_load"], stiffness=1e9, damping=1e5, rotational_stiffness=1e9,
+def by_run() -> Loop:
+    """A simulated test: two cycles under constant load, by the equations of motion."""
+    top = Top.rig(axial_load=SHEET.axial_load, stiffness=1e9, damping=1e5, rotational_stiffness=1e9,
                   rotational_damping=1e5)  # fmt: skip
     motion = Motion.harmonic(DISPLACEMENT, frequency=FREQUENCY, cycles=2)
-    cycle = simulate(Scene(Bearing.from_sheet(**SHEET), motion, top)).characterise().envelope
-    return {"k_eff": cycle["effective_stiffness"].mean, "damping": cycle["effective_damping"].mean}
+    found = simulate(Scene(BEARING, motion, top)).characterise().envelope
+    stiffness, height = found["effective_stiffness"].mean, found["zero_displacement_force"].mean
+    by_height = 2 * height / (math.pi * stiffness * DISPLACEMENT)
+    return Loop(stiffness, found["effective_damping"].mean, by_height)
+
+
+def by_opensees() -> Loop:
+    """The element of OpenSees for triple pendulums. Raises ImportError where OpenSeesPy is not installed."""
+    u, force = cycle(SHEET, BEARING, DISPLACEMENT)
+    falling = slice(int(u.argmax()), int(u.argmin()) + 1)
+    height = float(np.interp(0.0, -u[falling], force[falling]))  # at u = 0, on the way back
+    return loop(float(np.ptp(force)) / 2, float(np.trapezoid(force, u)), abs(height))
 
 
 def checks() -> str:
-    """The three, as a table."""
-    rows = [("by hand", by_hand()), ("by the sheet", by_sheet()), ("by a run", by_run())]
-    lines = [f"{name:14} k_eff {row['k_eff'] / 1e3:6.1f} kN/m   damping {row['damping']:6.2%}" for name, row in rows]
-    return "\n".join([f"one bearing at {1e3 * DISPLACEMENT:g} mm under {SHEET['axial_load'] / 1e3:g} kN", *lines])
+    """All of them, as a table."""
+    found = {"by hand": by_hand(), "by the sheet": by_sheet(), "by a run": by_run()}
+    with suppress(ImportError):
+        found["by OpenSees"] = by_opensees()
+    lines = [
+        f"{name:14} k_eff {one.stiffness / 1e3:6.1f} kN/m   damping {one.by_area:6.2%} by the area of the loop, "
+        f"{one.by_height:6.2%} by its height"
+        for name, one in found.items()
+    ]
+    return "\n".join([f"one bearing at {1e3 * DISPLACEMENT:g} mm under {SHEET.axial_load / 1e3:g} kN", *lines])
 
 
 def shortened(folder: Path) -> Path:
@@ -104,6 +128,7 @@ def main() -> None:
     else:
         suite.write_text((HERE / "suite.toml").read_text(encoding="utf-8"), encoding="utf-8")
     command("sheet", scene, "--displacement", f"{DISPLACEMENT} m", "-o", folder / "sheet.png")
+    command("equivalent", scene, "--spectrum", HERE / "spectrum.csv", "--torsion", TORSION)
     command("bound", scene, "--suite", suite, "-o", folder / "analysis")
     command("report", folder / "analysis", "-o", folder / "report.html", "--project", "Hospital on twenty pendulums",
             "--code", "example, no code", "--author", "an engineer", "--checker", "another engineer")  # fmt: skip

@@ -36,6 +36,14 @@ def target(vertical: bool) -> np.ndarray:
     return 0.6 * np.interp(np.minimum(3.0 * PERIODS, PERIODS[-1]), PERIODS, np.interp(PERIODS, period, values))
 
 
+def wanted_spectra(random: np.random.Generator) -> np.ndarray:
+    """What one record is made to: the target of each component times a smooth random factor, shape (periods, 3)."""
+    knots = np.linspace(0.0, 1.0, 9)
+    at = np.linspace(0.0, 1.0, len(PERIODS))  # both even in the logarithm of the period
+    factors = [np.exp(np.interp(at, knots, random.normal(0.0, SCATTER, len(knots)))) for _ in range(3)]
+    return np.column_stack([target(axis == 2) * factor for axis, factor in enumerate(factors)])
+
+
 def artificial(seed: int) -> np.ndarray:
     """Accelerations along E1, E2, E3 at multiples of STEP, shape (k, 3) [m/s^2]."""
     random = np.random.default_rng(seed)
@@ -44,11 +52,7 @@ def artificial(seed: int) -> np.ndarray:
     frequency = np.fft.rfftfreq(length, STEP)
     at = 1.0 / np.maximum(frequency, 1e-9)  # periods
     passes = np.clip(4.0 * (frequency * LONGEST - 1.0), 0.0, 1.0)
-    wanted = np.empty((len(PERIODS), 3))
-    for axis in range(3):
-        knots = np.geomspace(PERIODS[0], PERIODS[-1], 9)
-        scatter = np.interp(np.log(PERIODS), np.log(knots), random.normal(0.0, SCATTER, 9))
-        wanted[:, axis] = target(axis == 2) * np.exp(scatter)
+    wanted = wanted_spectra(random)
     noise = random.normal(size=(count, 3)) * envelope(time)[:, None]
     shape = np.fft.rfft(noise, length, axis=0) * passes[:, None]
     for _ in range(ROUNDS):

@@ -27,9 +27,9 @@ STOREY = (
 class Modes(NamedTuple):
     """Modes of the undamped building on fixed attachments, from the lowest.
 
-    frequencies: shape (modes,) [Hz]. participating: mass in rigid motion along E1, E2, E3 over the whole mass, shape
-    (modes, 3) [-]. shapes: of the nodes, along E1, E2 and about E3 times half the diagonal of the plan, the largest 1,
-    shape (modes, nodes, 3) [-].
+    frequencies: shape (modes,) [Hz]. participating: mass in rigid motion along E1, E2, E3 over the mass above the
+    attachments, shape (modes, 3) [-]. shapes: of the nodes, along E1, E2 and about E3 times half the diagonal of the
+    plan, the largest 1, shape (modes, nodes, 3) [-].
     """
 
     frequencies: Array
@@ -42,7 +42,8 @@ def modes_of(scene: BuildingScene) -> Modes:
     building = scene.building
     fixed, rigid = building.fixed, building.rigid_motions[:, :3]
     forces = (building.mass @ rigid)[fixed.inner]
-    whole = np.diag(rigid.T @ building.mass @ rigid)
+    above = np.diag(rigid[fixed.inner].T @ building.mass[np.ix_(fixed.inner, fixed.inner)] @ rigid[fixed.inner])
+    above = np.where(above > 0, above, 1.0)  # no mass, and nothing takes part
     motions = np.zeros((len(building.mass), len(fixed.frequencies)))
     motions[fixed.inner] = fixed.modes
     arm = np.linalg.norm(np.ptp(scene.places, axis=0)) / 2
@@ -51,7 +52,7 @@ def modes_of(scene: BuildingScene) -> Modes:
     at = np.abs(shapes).reshape(len(shapes), -1).argmax(axis=1)
     largest = shapes.reshape(len(shapes), -1)[np.arange(len(shapes)), at]
     largest[largest == 0] = 1.0  # a vertical mode
-    return Modes(building.frequencies, (fixed.modes.T @ forces) ** 2 / whole, shapes / largest[:, None, None])
+    return Modes(building.frequencies, (fixed.modes.T @ forces) ** 2 / above, shapes / largest[:, None, None])
 
 
 def mode_table(modes: Modes) -> Table:
@@ -62,7 +63,7 @@ def mode_table(modes: Modes) -> Table:
     ]
     total = ("sum of all", "", "", *(f"{100 * share:.2f}" for share in modes.participating.sum(axis=0)))
     masses = (f"mass along E{axis} [%]" for axis in (1, 2, 3))
-    title = "modes on a fixed base; participating mass over the whole, base included"
+    title = "modes on a fixed base; participating mass over the mass above it"
     return Table(title, ("mode", "period [s]", "frequency [Hz]", *masses), [*rows[:LISTED], total])
 
 
