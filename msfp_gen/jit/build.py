@@ -24,6 +24,7 @@ import json
 import os
 import re
 import shutil
+import threading
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -346,12 +347,20 @@ LIBRARIES = ("-pthread",)
 SUFFIXES = (".c", ".h", ".pyx")
 
 
-@remember
+_loading = threading.Lock()  # a module of Cython can be imported once: of two threads the second waits
+
+
 def load_driver(package: str) -> tuple[ModuleType, str]:
     """The module of the `.pyx` and the C files in `<package>/compiled`, and the hash of all that determines it.
 
     Raises CompileError: no C compiler was found, or it rejected a file; InputError: the cache cannot be written to.
     """
+    with _loading:
+        return _driver(package)
+
+
+@remember
+def _driver(package: str) -> tuple[ModuleType, str]:
     module, files = _named(package)
     if (ready := find_prebuilt_driver(module, files)) is not None:
         folder, manifest = ready

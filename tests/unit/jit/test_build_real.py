@@ -52,3 +52,20 @@ def test_generated_folder_serves_a_plain_script(built: BuildInfo, tmp_path: Path
 def test_layouts_and_effects_have_entries_of_their_own(built: BuildInfo) -> None:
     other = Entry.of(ModelSpec(Layout(2, 1, 0)))
     assert other.folder != built.folder and other.module == "msfp_2_1_0"
+
+
+def test_two_threads_import_a_driver_once() -> None:
+    """Both ask at once in a new process: a study of buildings begins so, and a module of Cython is imported once."""
+    script = (
+        "from concurrent.futures import ThreadPoolExecutor\n"
+        "from threading import Barrier\n"
+        "from msfp_gen.jit.build import load_driver\n"
+        "meet = Barrier(4)\n"
+        "def load(_):\n"
+        "    meet.wait()\n"
+        "    return load_driver('msfp_gen.buildings')[0]\n"
+        "found = list(ThreadPoolExecutor(4).map(load, range(4)))\n"
+        "assert all(module is found[0] for module in found)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
