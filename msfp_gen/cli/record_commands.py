@@ -20,6 +20,7 @@ app = typer.Typer()
 
 @app.command(
     epilog="Examples:\n\n\b\n  msfp-gen record RSN6_180.AT2 RSN6_270.AT2 RSN6_UP.AT2\n"
+    "  msfp-gen record x.txt y.txt z.txt --unit cm/s2 --time-step 0.005\n"
     "  msfp-gen record station.v2 --as-is --duration 40\n"
     "  msfp-gen record station.v2 --components E1,E3 --rotated-by 30 -o turned.csv\n"
     "  msfp-gen record ridgecrest-2019-ci-clc --duration 60 --plot correction.png --spectrum spectrum.csv\n"
@@ -31,6 +32,13 @@ def record(
         list[str],
         typer.Argument(metavar="FILE...", help="A record, one file per component, or the name of a bundled one."),
     ],
+    unit: Annotated[
+        str | None, typer.Option(metavar="UNIT", help="Of the numbers in files without a header: g, cm/s2, m/s, ...")
+    ] = None,
+    time_step: Annotated[
+        float | None,
+        typer.Option(parser=number, metavar="SECONDS", help="Of files without a header and without a column of times."),
+    ] = None,
     components: Annotated[
         str | None, typer.Option(metavar="E1,E2,E3", help="Components to keep; the others are zero.")
     ] = None,
@@ -84,7 +92,7 @@ def record(
     from msfp_gen.motions.records.record_tables import record_tables
 
     target = None if scale_to is None else ScaleTo.parse(scale_to)
-    raw = _turned(_read(files), components, rotated_by)
+    raw = _turned(_read(files, unit, time_step), components, rotated_by)
     process = correct or as_is or plot is not None or any(v is not None for v in (start, duration, corner, target))
     corrected, factor = _prepared(raw, target, start, duration, not as_is, corner) if process else (None, 1.0)
     motion = raw if corrected is None else corrected if target is None else corrected.scaled(factor)
@@ -129,10 +137,12 @@ def suite(
         note(f"wrote {spectrum}")
 
 
-def _read(files: list[str]) -> Record:
+def _read(files: list[str], unit: str | None, time_step: float | None) -> Record:
     from msfp_gen.motions.records import BUNDLED, bundled, read_record
 
-    return bundled(files[0]) if len(files) == 1 and files[0] in BUNDLED else read_record(*files)
+    if len(files) == 1 and files[0] in BUNDLED and unit is None and time_step is None:
+        return bundled(files[0])
+    return read_record(*files, unit=unit, time_step=time_step)
 
 
 def _turned(raw: Record, components: str | None, degrees: float | None) -> Record:

@@ -9,7 +9,8 @@ from os import PathLike
 from pathlib import Path
 
 from msfp_gen.common.errors import InputError
-from msfp_gen.motions.records import cosmos, csmip, csv_table, knet, peer
+from msfp_gen.motions.checks import positive
+from msfp_gen.motions.records import cosmos, csmip, csv_table, headerless, knet, peer
 from msfp_gen.motions.records.correction import Corrected, baseline_corrected, strong_window, uncorrected
 from msfp_gen.motions.records.csv_table import Table, read_table, write_csv
 from msfp_gen.motions.records.peer import read_peer
@@ -65,23 +66,36 @@ _FORMATS = (
 BUNDLED = ("ridgecrest-2019-ci-ccc", "ridgecrest-2019-ci-clc")
 
 
-def read_record(path: str | PathLike[str], *more: str | PathLike[str]) -> Record:
+def read_record(
+    path: str | PathLike[str], *more: str | PathLike[str], unit: str | None = None, time_step: float | None = None
+) -> Record:
     """Read a record from one file, or from several files of one recording.
 
     The format is recognised from the content: CSMIP and COSMOS V1 and V2, PEER .AT2, .VT2 and .DT2, K-NET and KiK-net,
     and CSV with units in its header (docs/data.md). Files compressed by gzip are decompressed. The components are
     assigned to E1, E2, E3 by their azimuths, in a right-handed frame; where a file has none, by the order of the files.
 
+    Args:
+        path: of the file.
+        *more: of further files of the recording.
+        unit: of the numbers in files without a header.
+        time_step: between the rows of files without a header and without a column of times [s].
+
     Raises:
         InputError: the format is unknown, the data are damaged, or the files are not of one recording. The message
-            names file, line and reason.
+            names file, line and reason. Or unit or time_step is given for files that state them.
     """
-    return _record_of([read_lines(Path(p)) for p in (path, *more)])
+    if time_step is not None:
+        positive("time_step", time_step)
+    return _record_of([read_lines(Path(p)) for p in (path, *more)], unit, time_step)
 
 
-def _record_of(parts: list[Lines]) -> Record:
+def _record_of(parts: list[Lines], unit: str | None = None, time_step: float | None = None) -> Record:
     """The record in the lines of one file, or of several."""
+    if all(map(headerless.matches, parts)) and _known(parts[0]) is None:
+        return headerless.read(parts, unit, time_step)
     if len(parts) == 1 and csv_table.matches(parts[0]):
+        _stated("CSV", parts[0], unit, time_step)
         return csv_table.read(parts[0])
     formats = [_format_of(lines) for lines in parts]
     for lines, kind in zip(parts, formats, strict=True):
@@ -89,15 +103,27 @@ def _record_of(parts: list[Lines]) -> Record:
             raise InputError(
                 f"{lines.path.name}: {kind.name}, but {parts[0].path.name} is {formats[0].name}; give one recording"
             )
+    _stated(formats[0].name, parts[0], unit, time_step)
     channels = [channel for lines in parts for channel in formats[0].read(lines)]
     return assemble_record(channels, formats[0].name, formats[0].notes)
 
 
+def _stated(kind: str, lines: Lines, unit: str | None, time_step: float | None) -> None:
+    """Raise InputError where options are given for a file whose header has them."""
+    for name, value in (("unit", unit), ("time_step", time_step)):
+        if value is not None:
+            raise InputError(f"{name} = {value!r}: {lines.path.name} is {kind}, whose header states it; leave it out")
+
+
+def _known(lines: Lines) -> _Format | None:
+    """Format of a file with a header; None where it has none that is known."""
+    return next((file_format for file_format in _FORMATS if file_format.matches(lines)), None)
+
+
 def _format_of(lines: Lines) -> _Format:
     """Format of a file. Raises InputError if it is unknown."""
-    for file_format in _FORMATS:
-        if file_format.matches(lines):
-            return file_format
+    if (known := _known(lines)) is not None:
+        return known
     names = ", ".join(file_format.name for file_format in _FORMATS)
     lines.fail(0, f"unknown format; give {names}, or one CSV with a header like: time [s], a1 [m/s^2]")
 

@@ -10,14 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import check_output, replacing
 from msfp_gen.motions.records.record import Record, common_window, derived_note, differentiated, stem
-from msfp_gen.motions.records.text import Lines, column, read_lines
+from msfp_gen.motions.records.text import Lines, column, even_step, read_lines
 
 COLUMN = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\]|\(([^)]*)\))\s*")
 _QUANTITIES = {"a": ("acceleration", "m/s^2"), "v": ("velocity", "m/s"), "u": ("displacement", "m")}
-_UNEVEN = 1e-3  # permitted deviation of printed times from even spacing, as a share of the time step
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,19 +57,7 @@ def read_table(path: str | PathLike[str]) -> Table:
 def read(lines: Lines) -> Record:
     """The record in a table. Raises InputError unless its times are evenly spaced."""
     table = _table(lines)
-    steps = np.diff(table.time)
-    step = float((table.time[-1] - table.time[0]) / len(steps)) if len(steps) else 0.0
-    even = table.time[0] + step * np.arange(len(table.time))
-    if len(steps) < 3:
-        raise InputError(f"{lines.path.name}: {len(steps) + 1} times, fewer than 4; give a longer record")
-    if not np.all(np.abs(table.time - even) <= _UNEVEN * step):
-        usual = float(np.median(steps))
-        row = int(np.argmax(np.abs(steps - usual))) + 1
-        lines.fail(
-            table.lines[row],
-            f"times are not evenly spaced: from {table.time[row - 1]:.6g} to {table.time[row]:.6g} s, where "
-            f"other steps are of {usual:.4g} s; fill the gap, resample, or use Motion.from_csv",
-        )
+    step = even_step(lines, table.time, table.lines)
     return Record(
         name=table.name,
         time_step=step,

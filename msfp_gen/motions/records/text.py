@@ -6,7 +6,7 @@ import gzip
 import io
 import re
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -21,6 +21,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _DECIMALS = re.compile(r"[^.]*(?:\.(\d*))?(?:[eE][+-]?(\d+))?")
 _FIXED = 10  # numbers of one form, one of them with a zero at its end, show that all are written with fixed decimals
 _MOST = 0.95  # share of numbers with more digits than the last one, above which it may be cut
+_UNEVEN = 1e-3  # permitted deviation of printed times from even spacing, as a share of the time step
 _MAX_VALUE = 1e100  # larger numbers are rejected, so that conversions of units cannot overflow
 _MAX_BYTES = 256 << 20  # of text, after decompression
 _GZIP = b"\x1f\x8b"
@@ -184,6 +185,26 @@ def lines_of(path: Path, content: bytes) -> Lines:
     except UnicodeDecodeError:
         text = content.decode("latin-1")
     return Lines(path, text)
+
+
+def even_step(lines: Lines, time: Array, places: Sequence[int]) -> float:
+    """The step of a column of times, shape (k,) [s]. places: index of the line of each.
+
+    Raises InputError for fewer than 4 times, and at the line where they are not evenly spaced.
+    """
+    steps = np.diff(time)
+    if len(steps) < 3:
+        raise InputError(f"{lines.path.name}: {len(steps) + 1} times, fewer than 4; give a longer record")
+    step = float((time[-1] - time[0]) / len(steps))
+    if not np.all(np.abs(time - (time[0] + step * np.arange(len(time)))) <= _UNEVEN * step):
+        usual = float(np.median(steps))
+        row = int(np.argmax(np.abs(steps - usual))) + 1
+        lines.fail(
+            places[row],
+            f"times are not evenly spaced: from {time[row - 1]:.6g} to {time[row]:.6g} s, where "
+            f"other steps are of {usual:.4g} s; fill the gap, resample, or use Motion.from_csv",
+        )
+    return step
 
 
 def search(pattern: re.Pattern[str], head: Iterable[str]) -> re.Match[str] | None:

@@ -284,6 +284,7 @@ class Ramp(MotionTable):
 class RecordMotion(MotionTable):
     """`Motion.from_record`: one file, one file for each component, or a record bundled with the package.
 
+    unit, time_step: of files of numbers without a header, as of `records.read_record`.
     components: those that are kept; the others are zero. rotated_by: rotation of the horizontal components that are
     kept, about E3 from E1 towards E2. scale_to: a table of the fields of `records.ScaleTo`.
     """
@@ -291,6 +292,8 @@ class RecordMotion(MotionTable):
     kind: ClassVar[str] = "record"
     file: Annotated[str | tuple[str, ...] | None, Paths(several=True)] = None
     bundled: str | None = None
+    unit: str | None = None
+    time_step: Annotated[float | None, _TIME] = None
     components: Annotated[tuple[str, ...] | None, Components()] = None
     rotated_by: Annotated[float | None, _ANGLE] = None
     scale: Annotated[float, Quantity("")] = 1.0
@@ -305,9 +308,10 @@ class RecordMotion(MotionTable):
         from msfp_gen.motions.records import ScaleTo
 
         source = self.bundled or _digests(self.files)
-        record = _records.value(fingerprint((source, self.components, self.rotated_by)), self._record)
+        read_by = (source, self.unit, self.time_step, self.components, self.rotated_by)
+        record = _records.value(fingerprint(read_by), self._record)
         target = None if self.scale_to is None else ScaleTo(**self.scale_to)
-        values = self._values("file", "bundled", "components", "rotated_by", "scale_to")
+        values = self._values("file", "bundled", "unit", "time_step", "components", "rotated_by", "scale_to")
         return Motion.from_record(record, scale_to=target, **values | {"name": self.name or None})
 
     @property
@@ -321,7 +325,12 @@ class RecordMotion(MotionTable):
     def _record(self) -> Record:
         from msfp_gen.motions import records
 
-        record = records.bundled(self.bundled) if self.bundled is not None else records.read_record(*self.files)
+        if self.bundled is None:
+            record = records.read_record(*self.files, unit=self.unit, time_step=self.time_step)
+        elif self.unit is not None or self.time_step is not None:
+            raise InputError("motion.unit and motion.time_step are of files without a header; leave them out")
+        else:
+            record = records.bundled(self.bundled)
         record = record if self.components is None else record.with_components(self.components)
         return record if self.rotated_by is None else record.rotated(self.rotated_by)
 
