@@ -26,6 +26,7 @@ from msfp_gen.scene.plausibility import (
     doubtful_values,
     judged,
     ringing,
+    shear_doubts,
     unread_values,
 )
 from msfp_gen.scene.standing import unsteady
@@ -38,11 +39,13 @@ ENERGY = (
 )
 
 
-def notes_of(scene: BuildingScene, monitored: Sequence[Note], error: float, time: float) -> tuple[Note, ...]:
+def notes_of(
+    scene: BuildingScene, monitored: Sequence[Note], error: float, time: float, shear: tuple[float, float]
+) -> tuple[Note, ...]:
     """The notes of a run in order of time; a note about a bearing begins with the label of the bearing.
 
     monitored: notes of the monitors of the bearings. error: largest error of the energy balance [-]. time: of this
-    error [s].
+    error [s]. shear: largest base shear [N], and its time [s].
     """
     values = [
         replace(note, bearing=number)
@@ -53,6 +56,8 @@ def notes_of(scene: BuildingScene, monitored: Sequence[Note], error: float, time
     labelled = [replace(note, text=f"{scene.label(note.bearing - 1)}: {note.text}") for note in notes]
     whole = [Note(0.0, "value", *doubt) for doubt in building_doubts(scene)]
     whole += [Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity])] if scene.fidelity in UNSEEN else []
+    doubts = shear_doubts(shear[0], scene.weight, "base shear", "weight of the building")
+    whole += [Note(shear[1], "value", *doubt) for doubt in doubts]
     if error > ENERGY_LIMIT:
         whole.append(Note(time, "energy", 0, error, ENERGY.format(value=error)))
     return tuple(sorted([*labelled, *whole], key=lambda note: note.time))

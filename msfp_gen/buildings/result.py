@@ -101,7 +101,8 @@ class BuildingResult(AnyResult):
     def notes(self) -> tuple[Note, ...]:
         """Notes in order of time; a note on a bearing begins with its label (docs/buildings.md)."""
         error, row = self.energy_error
-        return notes_of(self.scene, self.monitored, error, float(self.time[row]))
+        shear = float(self.extremes.base_reaction[3]), float(self.extremes.times["base_reaction"][3])
+        return notes_of(self.scene, self.monitored, error, float(self.time[row]), shear)
 
     def node(self, name: str) -> Array:
         """Displacement, velocity and acceleration of a node: ndarray, shape (k, 3, 6), [m, rad], and per s and s^2."""

@@ -46,6 +46,7 @@ def characterise(
         Path | None, typer.Option("-o", "--output", metavar="FILE.csv", help="Write one row per cycle as CSV.")
     ] = None,
     as_json: AsJson = False,
+    force: Force = False,
 ) -> None:
     """Effective stiffness, damping, sliding regimes, capacity left, velocity and heat of a run, with envelopes."""
     from msfp_gen.common.output import check_output
@@ -53,7 +54,7 @@ def characterise(
 
     if output is not None:
         check_output(output, CSV_SUFFIXES, "--output")
-    result, failure = result_of(load_source(source))
+    result, failure = result_of(load_source(source), force)
     if failure is not None:
         raise failure
     characterisation = result.characterise()

@@ -180,6 +180,7 @@ def work_precision(
     duration: Duration = None,
     output: Folder = None,
     as_json: AsJson = False,
+    force: Force = False,
 ) -> None:
     """Error against cost of every method and tolerance; a second method confirms the reference."""
     from msfp_gen.studies.accuracy.study import TOLERANCES
@@ -188,7 +189,7 @@ def work_precision(
     settings = TOLERANCES if tolerances is None else numbers(tolerances)
     chosen = methods.split(",") if methods else None
     study = partial(work, methods=chosen, tolerances=settings, limit=limit, say=note)
-    _report(scene, duration, output, as_json, study)
+    _report(scene, duration, output, as_json, force, study)
 
 
 @bench.command(
@@ -203,24 +204,27 @@ def model_error(
     duration: Duration = None,
     output: Folder = None,
     as_json: AsJson = False,
+    force: Force = False,
 ) -> None:
     """Error against cost of simplified models: planar, massless, without rims, linearised, OpenSees."""
     from msfp_gen.studies.accuracy.study import MODEL_TOLERANCES, model_errors
 
     settings = MODEL_TOLERANCES if tolerances is None else numbers(tolerances)
     study = partial(model_errors, tolerances=settings, limit=limit, say=note)
-    _report(scene, duration, output, as_json, study)
+    _report(scene, duration, output, as_json, force, study)
 
 
 def _report(
-    name: str, duration: float | None, folder: Path | None, as_json: bool, study: Callable[[System], Study]
+    name: str, duration: float | None, folder: Path | None, as_json: bool, force: bool, study: Callable[[System], Study]
 ) -> None:
     """Load the scene, run the study, print it and write its files."""
     from msfp_gen.common.output import make_folder
     from msfp_gen.scene.file.source import load_scene
+    from msfp_gen.scene.plausibility import require_meant
     from msfp_gen.studies.accuracy.study import as_dict, tables, write
 
     scene = load_scene(name)
+    require_meant(scene, force=force)
     if duration is not None:
         scene = replace(scene, duration=duration)
     if folder is not None:

@@ -298,14 +298,14 @@ def run_scene(scene: Any, force: bool = False, **options: Any) -> tuple[Any, Run
             return error.result if is_result(error.result) else None, error
 
 
-def result_of(loaded: AnyResult | System) -> tuple[Any, RunError | None]:
+def result_of(loaded: AnyResult | System, force: bool = False) -> tuple[Any, RunError | None]:
     """A loaded result, or the run of a loaded scene, and the error of a failed run.
 
-    Raises RunError if nothing was computed.
+    force: as of `run_scene`. Raises RunError if nothing was computed.
     """
     if is_result(loaded):
         return loaded, None
-    result, failure = run_scene(loaded)
+    result, failure = run_scene(loaded, force)
     if result is None:
         assert failure is not None
         raise failure

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import (
+    Force,
     Progress,
     SignOption,
     load_source,
@@ -69,6 +70,7 @@ def plot(
         bool, typer.Option("--friction-circles", help="Add sphere centres and friction circles to the section.")
     ] = False,
     sign: SignOption = DEFAULT,
+    force: Force = False,
 ) -> None:
     """Draw a run: one figure, or all of them."""
     _check_figure_output(figure, output)
@@ -81,7 +83,7 @@ def plot(
     _reject_unused(targets, {"--time": time}, ("section", "force-path"))
     _reject_unused(targets, {"--azimuth": azimuth, "--friction-circles": friction_circles or None}, ("section",))
     make_folder(next(iter(targets.values())).parent, "--output")
-    result, failure = result_of(loaded)
+    result, failure = result_of(loaded, force)
     from msfp_gen.results.joining import at_times
 
     if time is not None:
@@ -117,6 +119,7 @@ def animate(
     ] = None,
     azimuth: Azimuth = None,
     sign: SignOption = DEFAULT,
+    force: Force = False,
 ) -> None:
     """Write a movie of the stack in motion, with its loop and the bars of sliding surfaces.
 
@@ -127,7 +130,7 @@ def animate(
 
     check_movie(output, "--output")
     sign_of(sign, "--sign")
-    result, failure = result_of(_load_for_figures(source))
+    result, failure = result_of(_load_for_figures(source), force)
     angle = None if azimuth is None else math.radians(azimuth)
     with Progress("frames") as progress, using_sign(sign):
         write_movie(
@@ -220,6 +223,7 @@ def report(
     no_runs: Annotated[
         bool, typer.Option("--no-runs", help="Make no run of a suite again: no loops, nothing on vertical motion.")
     ] = False,
+    force: Force = False,
 ) -> None:
     """Write a run as one HTML file that needs no network: numbers, settings, figures, the bearing in motion.
 
@@ -243,7 +247,7 @@ def report(
     if leave_out or no_runs:
         option = "--leave-out" if leave_out else "--no-runs"
         raise InputError(f"{option}: it is for the report of a suite; give the folder of `bound --suite FILE -o DIR`")
-    result, failure = result_of(load_source(source))
+    result, failure = result_of(load_source(source), force)
     with Progress("report") as progress:
         write_report(result, path, count, progress, title)
     note(f"wrote {path}")
@@ -263,15 +267,19 @@ def explore(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE.html", help="The file to write.", show_default=True)
     ] = Path("explorer.html"),
+    force: Force = False,
 ) -> None:
     """Write one HTML file in which sliders change a bearing and its motion, and the response is computed at once."""
     from msfp_gen.common.output import check_output
     from msfp_gen.report import REPORT_SUFFIXES
     from msfp_gen.report.explore import write_explorer
     from msfp_gen.scene.file.source import load_bearing_scene
+    from msfp_gen.scene.plausibility import require_meant
 
     path = check_output(output, REPORT_SUFFIXES, "--output")
     first = None if scene is None else load_bearing_scene(scene)
+    if first is not None:
+        require_meant(first, force=force)
     with Progress("explorer") as progress:
         write_explorer(path, first, progress)
     note(f"wrote {path}")

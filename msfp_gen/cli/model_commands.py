@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import (
+    Force,
     SceneName,
     SignOption,
     building,
@@ -113,6 +114,7 @@ def explain(
         bool,
         typer.Option("--effects", help="Run it with each effect changed alone: change of results, time and verdict."),
     ] = False,
+    force: Force = False,
 ) -> None:
     """Describe a scene: bearing, motion, top, or building; what is modelled and how it is solved."""
     from msfp_gen.scene.explain import explain as describe
@@ -122,8 +124,10 @@ def explain(
     if not effects:
         show(describe(system))
         return
+    from msfp_gen.scene.plausibility import require_meant
     from msfp_gen.studies.accuracy.effect_by_effect import effect_by_effect
 
+    require_meant(system, force=force)
     show(effect_by_effect(system, note).tables)
 
 
@@ -238,6 +242,7 @@ def export(
         str | None,
         typer.Option(metavar="PLATFORM", help=f"Of the C library, if not this machine: {', '.join(TARGETS)}."),
     ] = None,
+    force: Force = False,
     *,
     effects: Effects,
 ) -> None:
@@ -263,10 +268,10 @@ def export(
             f"RUN = {words!r}: give one result, scene file or preset and no effects; layouts need --prefix"
         )
     else:
-        _export_rows(what[0], output, columns, sign)
+        _export_rows(what[0], output, columns, sign, force)
 
 
-def _export_rows(source: str, output: Path, columns: str | None, sign: str) -> None:
+def _export_rows(source: str, output: Path, columns: str | None, sign: str, force: bool) -> None:
     from msfp_gen.common.tables import TABLE_SUFFIXES
     from msfp_gen.results.files import export_columns
     from msfp_gen.results.result import Result
@@ -278,7 +283,7 @@ def _export_rows(source: str, output: Path, columns: str | None, sign: str) -> N
     loaded = load_source(source)
     if sign != DEFAULT and not isinstance(loaded, Scene | Result):
         raise InputError(f"--sign = {sign!r}: the columns of this run have one sign, base - top; leave it out")
-    result, failure = result_of(loaded)
+    result, failure = result_of(loaded, force)
     note(f"wrote {export_columns(result, output, names, sign)}")
     if failure is not None:
         raise failure

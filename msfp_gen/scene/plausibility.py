@@ -325,6 +325,19 @@ def scene_doubts(scene: SceneFields) -> Iterator[Doubt]:
             yield 0, ratio, ringing(name, damping, what, turn, ratio, cure)
 
 
+MOST_SHEAR = 1.0  # horizontal force over the load at rest above which one of the two is doubtful
+
+
+def shear_doubts(force: float, load: float, name: str, of_load: str) -> Iterator[Doubt]:
+    """The doubt about the largest horizontal force of a run [N]. load: at rest [N]. name, of_load: what both are."""
+    if force > MOST_SHEAR * load > 0:
+        text = (
+            f"the {name} reaches {force:.4g} N, {force / load:.3g} times the {of_load} of {load:.4g} N: friction and "
+            "the slope of dishes give no more than half of it; are loads in N and masses in kg, or does a rim carry it?"
+        )
+        yield 0, force, text
+
+
 def refusals(system: Any) -> list[str]:
     """The texts of the doubts about values that no unit can make right, each once."""
     if not isinstance(system, Scene):
@@ -333,7 +346,11 @@ def refusals(system: Any) -> list[str]:
 
 
 def require_meant(*systems: Any, force: bool = False) -> None:
-    """Raise InputError for values of systems that no unit can make right, unless `force`."""
+    """Raise InputError for values of systems that no unit can make right, unless `force`.
+
+    Commands, studies, bounds and fits call it. `simulate` does not: it takes a scene that a program has made, a limit
+    case perhaps, and gives its result the note.
+    """
     found = [] if force else list(dict.fromkeys(text for system in systems for text in refusals(system)))
     if found:
         raise InputError(f"{'; '.join(found)} (a command runs it with --force, a function of Python with force=True)")

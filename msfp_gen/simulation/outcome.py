@@ -20,7 +20,7 @@ from msfp_gen.results.sliding import intervals, sliding_surfaces
 from msfp_gen.scene.effect_selection import load_at_rest, rigid_mass_limit
 from msfp_gen.scene.effect_switching import JAM_STATUSES
 from msfp_gen.scene.fidelity import UNSEEN
-from msfp_gen.scene.plausibility import scene_doubts
+from msfp_gen.scene.plausibility import scene_doubts, shear_doubts
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import MARGIN, seat_stiffness, standing_of
@@ -180,12 +180,21 @@ def history_notes(
     unseen = (Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity]),) if scene.fidelity in UNSEEN else ()
     stack = scene.fidelity != "equivalent"
     doubts = unseen + tuple(Note(0.0, "value", *doubt) for doubt in scene_doubts(scene) if stack)
+    doubts += shear_notes(scene, history)
     physics = creep_notes(scene, effects, history)
     physics += peak_notes(scene, effects, history)
     numerics = energy_notes(scene, history) + tolerance_notes(scene, effects, history)
     numerics += vibration_notes(scene, effects, history, steps) + seat_notes(scene, effects, history)
     numerics += row_notes(scene, effects, history, extremes)
     return doubts + numerics + damping_notes(scene, history) + physics
+
+
+def shear_notes(scene: Scene, history: History) -> tuple[Note, ...]:
+    """A note where the horizontal force of the rows exceeds the load at rest."""
+    across = np.hypot(history.top_force[:, 0], history.top_force[:, 1])
+    row = int(across.argmax())
+    doubts = shear_doubts(float(across[row]), load_at_rest(scene), "horizontal force", "load at rest")
+    return tuple(Note(float(history.time[row]), "value", *doubt) for doubt in doubts)
 
 
 def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:

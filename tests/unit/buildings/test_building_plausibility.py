@@ -12,8 +12,20 @@ import numpy as np
 import pytest
 from support import ROOT
 
-from msfp_gen import InputError, Measurement, Scene, bound, changed_scene, fit, load_scene, presets, study
-from msfp_gen.buildings.notes import building_doubts, floors, value_notes
+from msfp_gen import (
+    InputError,
+    Measurement,
+    Motion,
+    Scene,
+    bound,
+    changed_scene,
+    fit,
+    load_scene,
+    presets,
+    simulate,
+    study,
+)
+from msfp_gen.buildings.notes import building_doubts, floors, notes_of, value_notes
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.cli import main
 from msfp_gen.scene.file.loader import scene_text
@@ -202,9 +214,23 @@ def test_what_is_refused_runs_if_it_is_told_to(tmp_path: Any, capsys: Any) -> No
     (tmp_path / "test.csv").write_text("\n".join(["time [s],displacement [m],force [N]", *rows]))
     of_study = ["study", str(tmp_path / "study.toml"), "-o", str(tmp_path / "study")]
     of_fit = ["fit", str(path), str(tmp_path / "test.csv"), "-p", "bearing.surfaces[*].friction"]
-    for command in (["batch", str(path)], ["bound", str(path)], ["characterise", str(path)], of_study, of_fit):
-        assert main(command) == 2 and "limits.displacement = 760 m" in capsys.readouterr().err
-    assert not (tmp_path / "study").exists()
+    picture, page = ["-o", str(tmp_path / "a.png")], ["-o", str(tmp_path / "a.html")]
+    running = [
+        ["batch", str(path)], ["bound", str(path)], ["characterise", str(path)], ["plot", str(path), *picture],
+        ["animate", str(path), "-o", str(tmp_path / "a.gif")], ["report", str(path), *page], of_study, of_fit,
+        ["export", str(path), "-o", str(tmp_path / "a.csv")], ["explore", str(path), *page],
+        ["explain", str(path), "--effects"], ["bench", "model-error", str(path)],
+        ["bench", "work-precision", str(path)],
+    ]  # fmt: skip
+    for command in running:
+        assert main(command) == 2 and "limits.displacement = 760 m" in capsys.readouterr().err, command
+        words = ["study", "run"] if command is of_study else command[: 1 + (command[0] == "bench")]
+        assert main([*words, "--help"]) == 0
+        assert "--force" in capsys.readouterr().out, command
+    assert {file.name for file in tmp_path.iterdir()} == {"scene.toml", "study.toml", "test.csv"}
+    assert main(["export", str(path), "--force", "-o", str(tmp_path / "a.csv")]) == 0
+    assert main(["characterise", str(path), "--force", "--json"]) == 0
+    capsys.readouterr()
     assert main(["run", str(path), "--force", "-o", str(out)]) == 0 and out.is_file()
     assert "limits.displacement = 760 m" in capsys.readouterr().err
 
@@ -231,6 +257,28 @@ def test_functions_of_python_refuse_what_commands_refuse(tmp_path: Any) -> None:
     require_meant(scene, force=True)
     with ThreadPoolExecutor(1) as executor:
         assert study(table, tmp_path / "out", executor=executor, force=True).failed == 0
+
+
+def test_forces_beyond_the_load_are_named() -> None:
+    """A bearing pushed far into its rims: the decisive note, in the print of the result; not where they just touch."""
+    scene = changed_scene("fenz-test5", {})
+    for amplitude, named in ((0.14, False), (0.18, True)):
+        result = simulate(replace(scene, motion=Motion.harmonic(amplitude, frequency=0.1, cycles=1)))
+        (row,) = [note for note in result.notes if "times the load at rest" in note.text] or [None]
+        assert (row is not None) == named == (result.summary["peak_force_ratio"] > 1)
+        if row is not None:
+            assert row.kind == "value" and "does a rim carry it" in str(result)
+            assert row.value == pytest.approx(result.summary["peak_force"]["radial"], rel=1e-6)
+
+
+def test_a_base_shear_beyond_the_weight_is_named() -> None:
+    scene = building({})
+    texts = {
+        share: [note.text for note in notes_of(scene, (), 0.0, 0.0, (share * scene.weight, 2.0))]
+        for share in (0.9, 1.1)
+    }
+    assert not any("the base shear" in text for text in texts[0.9])
+    assert any(f"the base shear reaches {1.1 * scene.weight:.4g} N, 1.1 times the weight" in t for t in texts[1.1])
 
 
 def test_a_single_bearing_has_no_plan() -> None:
