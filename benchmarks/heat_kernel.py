@@ -1,11 +1,12 @@
-"""Fit the heat kernel 1/sqrt(t) by a sum of exponentials: `python benchmarks/heat_kernel.py`.
+"""Fit the heat kernels of half-space and plate by sums of exponentials: `python benchmarks/heat_kernel.py`.
 
-Prints the table of `msfp_gen/specification/friction_laws.py` and draws `docs/figures/heat-kernel.png`: the error of the sum, and a
+Prints the tables of `msfp_gen/specification/friction_laws.py` and draws `docs/figures/heat-kernel.png`: the error of the sum, and a
 temperature computed by the sum and by the exact convolution.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,34 +14,57 @@ from drawing import COLOURS, drawn, panels
 from numpy.typing import NDArray
 from quick import docs_folder, parser
 
-from msfp_gen.specification.friction_laws import HEAT_ERROR, HEAT_KERNEL, LONGEST, SHORTEST
+from msfp_gen.specification.friction_laws import HEAT_ERROR, HEAT_KERNEL, LONGEST, PLATE_KERNEL, SHORTEST, THICK
 
 Array = NDArray[np.float64]
 FASTEST, SLOWEST = 6.0, 0.4  # rates of the first and last term, over 1/SHORTEST and 1/LONGEST
+NEXT = 4.32  # slowest fitted rate of a plate over that of its slowest mode; the second mode has 4
 
 
-def fit(count: int) -> tuple[Array, Array, float]:
-    """Rates in geometric progression [1/s], weights >= 0 with the least relative error, and that error.
+def fit(rates: Array, kernel: Callable[[Array], Array], times: Array, known: Array) -> tuple[Array, float]:
+    """Weights >= 0 of rates [1/s] with the least relative error of a kernel over `times`, and that error.
 
-    The weights solve a linear programme; the integral of the sum over [0, SHORTEST] is exact.
+    They solve a linear programme; the integral of the sum over [0, times[0]], where the kernel is 1/sqrt(t), is exact.
+    known: weights of the first rates.
     """
     from scipy.optimize import linprog
 
-    rates = np.geomspace(FASTEST / SHORTEST, SLOWEST / LONGEST, count)
-    times = np.geomspace(SHORTEST, LONGEST, 600)
-    scale = np.sqrt(rates)  # scales the weights so that the columns have similar size
-    terms = scale * np.exp(-np.outer(times, rates)) * np.sqrt(times)[:, None]
+    count, values, shortest = len(rates) - len(known), kernel(times), times[0]
+    scale = np.sqrt(rates[len(known) :])  # scales the weights so that the columns have similar size
+    terms, before = np.split(np.exp(-np.outer(times, rates)) / values[:, None], [len(known)], axis=1)[::-1]
+    left, terms = 1 - before @ known, scale * terms
     bound = -np.ones((len(times), 1))
-    first = scale * (1 - np.exp(-rates * SHORTEST)) / rates / (2 * np.sqrt(SHORTEST))
+    with np.errstate(invalid="ignore"):
+        whole = np.where(rates > 0, (1 - np.exp(-rates * shortest)) / rates, shortest) / (2 * np.sqrt(shortest))
     found = linprog(
         np.r_[np.zeros(count), 1.0],
         A_ub=np.vstack([np.hstack([terms, bound]), np.hstack([-terms, bound])]),
-        b_ub=np.r_[np.ones(len(times)), -np.ones(len(times))],
-        A_eq=np.r_[first, 0.0][None],
-        b_eq=[1.0],
+        b_ub=np.r_[left, -left],
+        A_eq=np.r_[scale * whole[len(known) :], 0.0][None],
+        b_eq=[1.0 - whole[: len(known)] @ known],
         method="highs",
     )
-    return rates, scale * found.x[:-1], float(found.x[-1])
+    return np.r_[known, scale * found.x[:-1]], float(found.x[-1])
+
+
+def half_space(count: int) -> tuple[Array, Array, float]:
+    """Rates in geometric progression [1/s], weights, and the error."""
+    rates = np.geomspace(FASTEST / SHORTEST, SLOWEST / LONGEST, count)
+    return rates, *fit(rates, lambda t: 1 / np.sqrt(t), np.geomspace(SHORTEST, LONGEST, 600), np.array([]))
+
+
+def plate(count: int) -> tuple[Array, Array, float]:
+    """The same of a plate, in the time tau D/d^2: two exact terms, then a geometric progression."""
+    shortest = SHORTEST / (THICK * LONGEST)
+    rates = np.r_[0.0, np.pi**2, np.geomspace(NEXT * np.pi**2, FASTEST / shortest, count - 2)]
+    known = np.sqrt(np.pi) * np.array([1.0, 2.0])
+    return rates, *fit(rates, images, np.geomspace(shortest, 1.0, 900), known)
+
+
+def images(tau: Array) -> Array:
+    """The kernel of a plate with an insulated back face, by images [-]."""
+    n = np.arange(1, 20)
+    return np.asarray((1 + 2 * np.exp(-np.divide.outer(n**2, tau)).sum(0)) / np.sqrt(tau))
 
 
 def summed(times: Array) -> Array:
@@ -91,12 +115,14 @@ def marched(t: Array, flux: Array) -> Array:
 
 
 def main() -> Any:
-    """Print the fit and draw the figure."""
+    """Print the fits and draw the figure."""
     parser(__doc__).parse_args()
-    rates, weights, error = fit(len(HEAT_KERNEL))
-    print(f"{len(rates)} terms, relative error {error:.3e} (table: {HEAT_ERROR:.1e})")
-    for rate, weight in zip(rates, weights, strict=True):
-        print(f"    ({rate:.10e}, {weight:.10e}),")
+    for name, table, found in (("half-space", HEAT_KERNEL, half_space), ("plate", PLATE_KERNEL, plate)):
+        rates, weights, error = found(len(table))
+        apart = np.abs(np.column_stack([rates, weights]) / np.where(np.array(table) == 0, 1, table) - 1)[1:].max()
+        print(f"{name}: {len(rates)} terms, relative error {error:.3e} (table: {HEAT_ERROR:.1e}, apart {apart:.1e})")
+        for rate, weight in zip(rates, weights, strict=True):
+            print(f"    ({rate:.10e}, {weight:.10e}),")
     draw()
 
 

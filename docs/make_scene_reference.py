@@ -120,6 +120,7 @@ MEANINGS = {
             "patch_radius",
             "conductivity",
             "diffusivity",
+            "plate_thickness",
             "start_temperature",
             "c1",
             "c2",

@@ -29,6 +29,7 @@ from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import Top
 from msfp_gen.simulation.simulate import simulate
+from msfp_gen.specification.friction_laws import BUILT_IN
 from msfp_gen.specification.layout import Auto
 
 OFF_CENTRE = 0.05  # permitted first displacement over the largest
@@ -233,9 +234,11 @@ def _difference(force: Array, data: Histories) -> float:
 def _variants(scene: Scene, result: Result, data: Histories) -> Iterator[tuple[str, Callable[[Scene], Scene]]]:
     """Name of an effect, and a function that takes it out of a scene."""
     word = scene.with_all_effects().modelled.friction if result.model_changes else result.effects.friction
-    if word == "pvt":
+    if word == "pvtd":
+        yield "thickness of the heated plates", lambda one: one.with_effects(friction="pvt")
+    if word in ("pvt", "pvtd"):
         yield "heat", lambda one: one.with_effects(friction="pv")
-    if word in ("pv", "pvt", "velocity"):
+    if word in BUILT_IN:
         yield "friction by velocity and pressure", lambda one: one.with_effects(friction="constant")
     if np.std(data.axial) > 1e-3 * data.at_rest:
         yield "varying axial force", lambda one: replace(one, load=None)

@@ -24,7 +24,7 @@ from msfp_gen.scene.file.source import scene_of
 from msfp_gen.scene.friction_parameters import coefficient, law_parameters, select_friction
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import MassTop
-from msfp_gen.specification.friction_laws import HEAT_KERNEL, Law, law_of
+from msfp_gen.specification.friction_laws import Law, Memory, law_of
 
 MOST_ROUNDS, SAME_TEMPERATURE = 40, 0.1  # of friction and temperature in turn; change between rounds [K]
 SETTLED = 5.0  # yield displacements within which the friction of a surface has turned to its new direction (tanh)
@@ -140,7 +140,7 @@ class Stated:
         return Coefficients(cold, heated, hottest)
 
     def _of_surface(self, index: int, time: Array, speed: Array, travel: Array, axial: Array) -> Coefficients:
-        """The coefficient of one surface, by its law; heat flows into a half space (docs/friction.md)."""
+        """The coefficient of one surface, by its law, heated as docs/friction.md has it."""
         mu = self.bearing.surfaces[index].friction
         if self.law is None:
             return Coefficients(np.full_like(time, mu), np.full_like(time, mu), None)
@@ -157,21 +157,25 @@ class Stated:
         if not self.law.depends_on_temperature:
             return Coefficients(cold, cold, None)
         heated, temperature = np.array(cold), np.full_like(time, start)
-        flux = own["heating"] * pressure * speed * (np.abs(travel) < own["reach"])
+        by_flux, pace = (own["plate_heating"], own[memory.pace]) if memory.pace else (own["heating"], 1.0)
+        flux = by_flux * pressure * speed * (np.abs(travel) < own["reach"])
         for _ in range(MOST_ROUNDS):
-            before, temperature = temperature, start + _heat(time, flux * heated)
+            before, temperature = (
+                temperature,
+                start + _heat(memory, pace, time, flux * heated),
+            )
             heated = np.array(coefficient(self.law, state | {memory.variable: temperature})[0])
             if np.abs(temperature - before).max() < SAME_TEMPERATURE:
                 break
         return Coefficients(cold, heated, temperature)
 
 
-def _heat(time: Array, source: Array) -> Array:
+def _heat(memory: Memory, pace: float, time: Array, source: Array) -> Array:
     """Rise of temperature by a source over time, as the memory of the compiled model has it, (T,) [K]."""
-    rates, weights = np.array(HEAT_KERNEL).T
-    steps = np.append(np.diff(time), 0.0)
-    decays = np.exp(-np.outer(steps, rates))
-    gains = source[:, None] * (weights / rates) * (1.0 - decays)
+    rates, weights = np.array(memory.parts).T
+    steps = np.append(np.diff(time), 0.0)[:, None]
+    decays, slow = np.exp(-pace * rates * steps), rates == 0.0
+    gains = source[:, None] * weights * np.where(slow, steps, (1.0 - decays) / (pace * (rates + slow)))
     parts, rise = np.zeros(len(rates)), np.zeros_like(time)
     for row in range(1, len(time)):
         parts = parts * decays[row - 1] + gains[row - 1]

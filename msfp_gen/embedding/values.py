@@ -25,7 +25,7 @@ _SURFACE = {
     "contact_damping": 1e-4, "seat_stiffness": 5e10, "seat_damping": 10.0,
     "friction_slow": 0.03, "velocity_rate": 50.0, "velocity_drop": 0.5, "reference_pressure": 15e6,
     "pressure_ratio": 0.7, "temperature_ratio": 0.7, "area": 0.03, "reach": 0.1, "heating": 6.6e-5,
-    "start_temperature": 20.0,
+    "plate_heating": 7e-6, "plate_rate": 0.01, "start_temperature": 20.0,
 }  # fmt: skip
 _TOP = {"stiffness": 1e9, "damping": 1e4, "rotational_stiffness": 1e8, "rotational_damping": 1e4}
 _INTERFACE = _TOP | {"vertical_stiffness": 3e8, "vertical_damping": 1e5}

@@ -82,6 +82,15 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
 
 /* ---- one evaluation ------------------------------------------------------------------------ */
 
+/* Memories whose rates a value of the surface multiplies, its pace, differ between surfaces. */
+#if MSFP_PACED
+enum { MSFP_GAINS = MSFP_NB };
+#define MSFP_GAIN(j) (j)
+#else
+enum { MSFP_GAINS = 1 };
+#define MSFP_GAIN(j) 0
+#endif
+
 /* The state and the inputs at which the equations are evaluated. */
 typedef struct {
     double base[3][6]; /* [order][u_g1..3 [m], psi_1, theta_1, phi_1 [rad]]: values, first and second derivatives */
@@ -96,7 +105,7 @@ typedef struct {
      * what the earlier stages give: y = foot[0] + foot_beta^2 y'', y' = foot[1] + foot_beta y''. */
     double foot[2], foot_beta;
 #if MSFP_MEMORY
-    double past[MSFP_NB], gain; /* the memory of a surface is its start + past + gain * source */
+    double past[MSFP_NB], gain[MSFP_GAINS]; /* the memory of a surface is its start + past + gain * source */
 #endif
 } msfp_point;
 

@@ -62,6 +62,7 @@ class Surface:
     patch_radius: Annotated[float | None, _SURFACE["patch_radius"]] = None
     conductivity: Annotated[float | None, _SURFACE["conductivity"]] = None
     diffusivity: Annotated[float | None, _SURFACE["diffusivity"]] = None
+    plate_thickness: Annotated[float | None, _SURFACE["plate_thickness"]] = None
     start_temperature: Annotated[float | None, _SURFACE["start_temperature"]] = None
     c1: Annotated[float | None, _SURFACE["c1"]] = None
     c2: Annotated[float | None, _SURFACE["c2"]] = None

@@ -16,9 +16,11 @@ from msfp_gen.specification.formula import Operations, fold, names_in
 from msfp_gen.specification.friction_laws import (
     BUILT_IN,
     HEAT,
+    LONGEST,
     MEMORIES,
     SPIN,
     SPIN_NUMBERS,
+    THICK,
     VARIABLES,
     Law,
     Spin,
@@ -191,13 +193,17 @@ def derived_parameters(parameters: Mapping[str, float | None]) -> dict[str, floa
 
     area: of the contact patch, pi r^2 [m^2]. reach: half the side of the square of that area; the patch covers the
     centre of the surface while the sliding displacement is smaller (Kumar et al. 2015) [m]. heating: sqrt(D/pi)/k
-    [K s^1/2 m^2/J]. Each is given where its inputs are.
+    [K s^1/2 m^2/J]. plate_heating, plate_rate: D/(sqrt(pi) k d) [K m^2/J] and D/d^2 [1/s] with the thickness d of the
+    plate, at most that beyond which it is a half-space. Each is given where its inputs are.
     """
     out: dict[str, float] = {}
     if (radius := parameters.get("patch_radius")) is not None:
         out |= {"area": pi * radius**2, "reach": radius * sqrt(pi / 4)}
     if (k := parameters.get("conductivity")) is not None and (d := parameters.get("diffusivity")) is not None:
         out["heating"] = (d / pi) ** 0.5 / k
+        if (thickness := parameters.get("plate_thickness")) is not None:
+            across = min(thickness**2 / d, THICK * LONGEST, key=lambda time: time.real)  # complex in `derived_slopes`
+            out |= {"plate_heating": out["heating"] / across**0.5, "plate_rate": 1 / across}
     return out
 
 
@@ -256,8 +262,9 @@ def checked_range(law: Law | None, bearing: Bearing, lower_load_limit: bool = Tr
             sides = [RANGES[name][[0, -1]] * (area if name == "p" else 1.0) for name in ("p", "N") if name in used]
             limits[index] = max(side[0] for side in sides) if lower_load_limit else 0.0, min(side[1] for side in sides)
         ranges["law_load"] = limits
-    if "T" in used:
-        ranges["law_temperature"] = RANGES["T"][[0, -1]]
+    if law is not None and law.depends_on_temperature:
+        assert law.memory is not None
+        ranges["law_temperature"] = RANGES[law.memory.variable][[0, -1]]
     return ranges
 
 
@@ -289,11 +296,12 @@ def _defect(law: Law, values: tuple[tuple[str, float], ...]) -> str | None:
 def select_friction(bearing: Bearing, text: str | None) -> str:
     """The word of the friction law whose parameters the surfaces have. text: formula of a custom law, or None.
 
-    Parameters of pressure, velocity and temperature select "pv": the monitor of heat adds temperature when needed.
+    Parameters of pressure, velocity and temperature select "pv": the monitor of heat adds temperature when needed. It
+    knows half-spaces only, so plates with a thickness select "pvtd".
     """
     if text is not None:
         return "custom"
-    words = {"pv": "reference_pressure", "velocity": "friction_slow"}
+    words = {"pvtd": "plate_thickness", "pv": "reference_pressure", "velocity": "friction_slow"}
     words_of_surfaces = (w for w, name in words.items() if any(getattr(s, name) is not None for s in bearing.surfaces))
     return next(words_of_surfaces, "constant")
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from msfp_gen.common.fields import Quantity
 from msfp_gen.specification import friction_laws
-from msfp_gen.specification.friction_laws import TEMPERATURE
+from msfp_gen.specification.friction_laws import TEMPERATURES
 from msfp_gen.specification.values import Array, Bound, Value
 
 if TYPE_CHECKING:
@@ -444,7 +444,7 @@ def _present(quantities: tuple[_Field, ...], effects: Effects) -> tuple[_Field, 
         "": True,
         "uplift": effects.uplift,
         "law": law is not None,
-        "heat": memory is TEMPERATURE,
-        "memory": memory not in (None, TEMPERATURE),
+        "heat": memory in TEMPERATURES,
+        "memory": memory not in (None, *TEMPERATURES),
     }
     return tuple(quantity for quantity in quantities if has[quantity.needs])

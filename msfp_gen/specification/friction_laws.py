@@ -12,6 +12,12 @@ geometric progression. The weights w_i minimise the largest relative error over 
 conditions: none is negative, and the integral over [0, SHORTEST] is exact. They are fitted by
 `benchmarks/heat_kernel.py`.
 
+A plate of thickness d with an insulated back face has the kernel 1/sqrt(tau) (1 + 2 sum exp(-n^2 d^2/(D tau))), which
+equals sqrt(D)/d times one function of tau D/d^2. The sum of exponentials of that function therefore serves plates of
+every thickness: D/d^2, the `pace` of a surface, multiplies its rates. Its first two terms are exact: the mean
+temperature of the plate, sqrt(pi), and the slowest mode across it, 2 sqrt(pi) exp(-pi^2 tau). Within LONGEST a plate
+thicker than sqrt(THICK D LONGEST) is a half-space, and is taken with that thickness.
+
 Hysteresis by Bouc-Wen (3.18): dY/dt = (u - Y (a Y u + b Z v))/d_y and dZ/dt = (v - Z (a Y u + b Z v))/d_y, where u, v
 are the components of the slip velocity. A law, which `Effects.bouc_wen` selects by name, gives the switches a, b, each
 0 or 1, from the products Y u and Z v. They are 1 where the friction state grows and 0 where it unloads elastically.
@@ -26,7 +32,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from typing import Any, NamedTuple
 
@@ -117,6 +123,25 @@ HEAT_KERNEL: tuple[tuple[float, float], ...] = (
     (4.0000000000e-04, 4.2786061899e-02),
 )
 """(lambda_i [1/s], w_i [s^-1/2])."""
+THICK = 7.0
+"""(d^2/D)/LONGEST of a plate whose images are 2 exp(-THICK) at LONGEST, no more than HEAT_ERROR."""
+PLATE_KERNEL: tuple[tuple[float, float], ...] = (
+    (0.0000000000e00, 1.7724538509e00),
+    (9.8696044011e00, 3.5449077018e00),
+    (4.2636691013e01, 4.5342002511e00),
+    (1.4950097304e02, 8.8450433575e00),
+    (5.2420908867e02, 1.5888362165e01),
+    (1.8380828102e03, 3.0952533403e01),
+    (6.4450397561e03, 5.5738969894e01),
+    (2.2598838980e04, 1.0852945540e02),
+    (7.9240399214e04, 1.9540808856e02),
+    (2.7784794048e05, 3.8079161189e02),
+    (9.7424393103e05, 6.8427698851e02),
+    (3.4160816003e06, 1.3407746004e03),
+    (1.1978122858e07, 2.2823076164e03),
+    (4.2000000000e07, 1.0235675390e04),
+)
+"""(lambda_i, w_i) in the time tau D/d^2, within HEAT_ERROR from SHORTEST/(THICK LONGEST) on [-]."""
 
 
 COEFFICIENTS = ("c1", "c2", "c3", "c4")
@@ -124,6 +149,7 @@ COEFFICIENTS = ("c1", "c2", "c3", "c4")
 # The default of `patch_radius` is the rim radius of the slider.
 PATCH: dict[str, float | None] = {"patch_radius": None}
 HEAT: dict[str, float | None] = {"conductivity": 18.0, "diffusivity": 4.44e-6, "start_temperature": 20.0}
+PLATE: dict[str, float | None] = {"plate_thickness": None}
 
 
 @dataclass(frozen=True)
@@ -144,6 +170,7 @@ class Memory:
         start: the parameter of the surface with its value at the start; "": zero.
         parameters: surface parameters that it needs, with their defaults.
         values: derived values of the surface that the compiled model stores for it.
+        pace: the one of them that multiplies the rates of the parts; "": none.
     """
 
     variable: str
@@ -160,6 +187,7 @@ class Memory:
     start: str = ""
     parameters: tuple[tuple[str, float | None], ...] = ()
     values: tuple[str, ...] = ()
+    pace: str = ""
 
     @cached_property
     def tree(self) -> ast.expr:
@@ -180,10 +208,23 @@ TEMPERATURE = Memory(
     parameters=tuple(HEAT.items()),
     values=("reach", "heating", "start_temperature"),
 )  # fmt: skip
+PLATE_TEMPERATURE = replace(
+    TEMPERATURE,
+    variable="Td",
+    source_unit="K/s",
+    meaning="temperature at the centre of a plate of finite thickness, heated by friction",
+    source="plate_heating * p * v",
+    parts=PLATE_KERNEL,
+    parameters=tuple((HEAT | PLATE).items()),
+    values=("reach", "plate_heating", "start_temperature", "plate_rate"),
+    pace="plate_rate",
+)
+TEMPERATURES = (TEMPERATURE, PLATE_TEMPERATURE)
 MEMORIES = {
     memory.variable: memory
     for memory in (
         TEMPERATURE,
+        PLATE_TEMPERATURE,
         Memory(
             "s",
             "m",
@@ -213,8 +254,9 @@ _NUMBERS = (
     Value("pressure_ratio", Quantity("", above=0.0), "factor on friction for a pressure increase of 50 MPa"),
     Value("temperature_ratio", Quantity("", above=0.0), "0.7 in Kumar et al. (2015); 1: no influence of temperature"),
     Value("patch_radius", Quantity("m", above=0.0), "radius of the contact patch"),
-    Value("conductivity", Quantity("W/(m K)", above=0.0), "thermal conductivity of the heated half-space"),
+    Value("conductivity", Quantity("W/(m K)", above=0.0), "thermal conductivity of the heated plate"),
     Value("diffusivity", Quantity("m^2/s", above=0.0), "its thermal diffusivity"),
+    Value("plate_thickness", Quantity("m", above=0.0), "its thickness; no heat leaves its back face"),
     Value("area", Quantity("m^2", above=0.0, computed=True), "area of the contact patch"),
     Value(
         "reach",
@@ -222,6 +264,12 @@ _NUMBERS = (
         "distance from the centre of the surface within which the patch covers that centre",
     ),
     Value("heating", Quantity("K s^1/2 m^2/J", above=0.0, computed=True), "sqrt(D/pi)/k of the heated half-space"),
+    Value(
+        "plate_heating",
+        Quantity("K m^2/J", above=0.0, computed=True),
+        "D/(sqrt(pi) k d) of the heated plate, whose mean temperature rises by sqrt(pi) times that per unit of heat",
+    ),
+    Value("plate_rate", Quantity("1/s", above=0.0, computed=True), "D/d^2 of the heated plate"),
     Value("start_temperature", Quantity("degC"), "temperature at the start"),
     *(Value(name, Quantity(""), "parameter of the law", other_unit="SI") for name in COEFFICIENTS),
 )
@@ -260,8 +308,8 @@ class Law:
 
     @property
     def depends_on_temperature(self) -> bool:
-        """Whether the formula contains the temperature T."""
-        return self.memory is TEMPERATURE
+        """Whether the formula contains a temperature, T or Td."""
+        return self.memory in TEMPERATURES
 
     @cached_property
     def needs_pressure(self) -> bool:
@@ -287,6 +335,7 @@ _PVT = (
     " * (temperature_ratio ** (T / 50) + 0.4) / (temperature_ratio ** (20 / 50) + 0.4)"
 )
 _PV = _PVT.replace("T /", "start_temperature /")
+_PVTD = _PVT.replace("T /", "Td /")
 _KUMAR_PARAMETERS: tuple[tuple[str, float | None], ...] = (
     ("reference_pressure", None),
     ("pressure_ratio", 0.7),
@@ -309,6 +358,7 @@ _LAWS = (
         tuple(HEAT),
     ),
     Law("pvt", "it depends on pressure, velocity and temperature (Kumar et al. 2015)", _PVT, _KUMAR_PARAMETERS),
+    Law("pvtd", "the same, where the heated plates have a thickness", _PVTD, _KUMAR_PARAMETERS),
 )
 BUILT_IN = {law.word: law for law in _LAWS}
 FRICTION = {

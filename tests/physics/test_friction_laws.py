@@ -415,8 +415,8 @@ def test_other_refusals() -> None:
 
 
 def test_laws_are_found_by_their_word() -> None:
-    assert law_of("constant") is None and set(BUILT_IN) == {"velocity", "pv", "pvt"}
-    assert [law.word for law in BUILT_IN.values() if law.depends_on_temperature] == ["pvt"]
+    assert law_of("constant") is None and set(BUILT_IN) == {"velocity", "pv", "pvt", "pvtd"}
+    assert [law.word for law in BUILT_IN.values() if law.depends_on_temperature] == ["pvt", "pvtd"]
 
 
 def test_without_heat_the_law_is_that_of_the_start() -> None:

@@ -38,6 +38,10 @@ HEAT = (
     "bearing.surfaces[0].start_temperature", "bearing.surfaces[0].conductivity", "bearing.surfaces[0].diffusivity",
     "bearing.surfaces[0].patch_radius",
 )  # fmt: skip
+PLATES = ("bearing.surfaces[0].plate_thickness", "bearing.surfaces[1].plate_thickness")
+PLATE_HEAT = (
+    "bearing.surfaces[0].diffusivity", "bearing.surfaces[1].diffusivity", "bearing.surfaces[0].conductivity",
+)  # fmt: skip
 STATE = ("initial_state.q[0][0]", "initial_state.q[1][1]", "initial_state.v[1][1]", "initial_state.h[0][0]")
 WEAK = ("contact_damping", "mass", "centroid", "gravity", "stiffness", "damping", "rotational_stiffness",
         "rotational_damping")  # fmt: skip
@@ -80,7 +84,12 @@ class FrozenSteps:
         """Richardson-extrapolated central differences."""
         changed = [changed_parameters(self.scene, {parameter: value}) for value in values_around(parameter, step)]
         runs = [self.run(scene, ())[0] for scene in changed]
-        return {name: derivative([run[name] for run in runs], step)[0] for name in CHECKED}
+        return {name: derivative([run[name] for run in runs], step)[0] for name in checked_of(runs[0])}
+
+
+def checked_of(values: dict[str, Any]) -> tuple[str, ...]:
+    """Names of the rows whose derivatives are checked."""
+    return (*CHECKED, "temperature") if "temperature" in values else CHECKED
 
 
 def check_frozen(
@@ -106,7 +115,7 @@ def check_frozen(
             continue  # at its bound, which a difference crosses
         step = step_of(parameter, weak * size if parameter.field in WEAK else size)
         found = frozen.differences(parameter, step)
-        for name in CHECKED:
+        for name in checked_of(values):
             together = TOGETHER.get(name, (name,))
             largest, value = (max(np.abs(each[other]).max() for other in together) for each in (found, values))
             noise = max(ROUNDING.get(name, 0.0), rounding) * value / step
@@ -157,6 +166,20 @@ def test_differences_with_the_same_steps_through_frictional_heating(method: str)
     scene = heated(patch_radius=0.15)
     values = check_frozen(replace(scene, solver=replace(scene.solver, method=method)), [*STACK, *HEAT], 1e-5, weak=1.0)
     assert values["temperature"].max() > 40.0
+
+
+def test_differences_with_the_same_steps_through_plates_of_a_thickness() -> None:
+    """One plate is thin enough that its back face matters within the run, the other a half-space."""
+    scene, (thin, thick) = heated(patch_radius=0.03), PLATES
+    bearing = scene.bearing.replace(plate_thickness=[2e-3, 0.3])
+    effects = replace(scene.effects, friction="pvtd", dimension="planar")
+    scene = replace(scene, bearing=bearing, effects=effects, output_step=None)
+    values = check_frozen(scene, [thin, thick, *PLATE_HEAT], 1e-5, weak=1.0)
+    assert values["temperature"].max() > 40.0
+    parameters = parameters_of(scene, PLATES)
+    frozen = FrozenSteps(scene)
+    _, (of_thin, of_thick) = frozen.run(frozen.scene, parameters)
+    assert np.abs(of_thin["top_force"]).max() > 0 and np.abs(of_thick["top_force"]).max() == 0
 
 
 @pytest.mark.slow

@@ -42,23 +42,45 @@ def cover(away: Array, radius: float) -> Array:
     return 0.5 + z * (3 - z**2) / 4
 
 
-def temperature(t: Array, q: Array, k: float, D: float, T0: float) -> Array:
+def temperature(t: Array, q: Array, k: float, D: float, T0: float, rows: Array | None = None) -> Array:
     """T0 + sqrt(D/pi)/k times the integral of q(t - tau)/sqrt(tau), the O(n^2) sum over all pairs of times [degC].
 
     The flux q [W/m^2] is linear between its samples; each interval is integrated exactly.
+    rows: where; None: everywhere.
     """
-    out = np.full(len(t), T0)
-    for i in range(1, len(t)):
+    rows = np.arange(len(t)) if rows is None else rows
+    out = np.full(len(rows), T0)
+    for place, i in enumerate(rows):
         a, b = t[i] - t[:i], t[i] - t[1 : i + 1]  # tau at the two ends of each interval
         slope = (q[1 : i + 1] - q[:i]) / (t[1 : i + 1] - t[:i])
         first = 2 * (np.sqrt(a) - np.sqrt(b))
         second = 2 / 3 * (a**1.5 - b**1.5)
-        out[i] += np.sqrt(D / np.pi) / k * (q[:i] * first + slope * (a * first - second)).sum()
+        out[place] += np.sqrt(D / np.pi) / k * (q[:i] * first + slope * (a * first - second)).sum()
+    return out
+
+
+def images(tau: Any, d: float, D: float) -> Any:
+    """2 sum exp(-n^2 d^2/(D tau)), to 1e-16: what the back face of a plate adds to the kernel, over it."""
+    across = d**2 / (D * np.asarray(tau, float))
+    n = np.arange(1, int(np.ceil((37 / across.min()) ** 0.5)) + 1)
+    return 2 * np.exp(-np.multiply.outer(across, n**2)).sum(-1)
+
+
+def image_temperature(t: Array, q: Array, k: float, D: float, d: float, rows: Array) -> Array:
+    """What the images add to `temperature` in a plate of thickness d, at some rows [K].
+
+    Images are smooth in time: a trapezoidal sum.
+    """
+    out = np.zeros(len(rows))
+    for place, i in enumerate(rows):
+        tau = t[i] - t[:i]
+        kernel = np.append(images(tau, d, D) / np.sqrt(tau), 0.0)
+        out[place] = np.sqrt(D / np.pi) / k * np.trapezoid(q[: i + 1] * kernel, t[: i + 1])
     return out
 
 
 def temperature_by_states(t: Array, q: Array, k: float, D: float, T0: float, kernel: Any) -> Array:
-    """The same with the kernel given as (rate, weight) of exponentials, each integrated exactly [degC]."""
+    """`temperature` with the kernel given as (rate, weight) of exponentials, each integrated exactly [degC]."""
     rate, weight = np.array(kernel).T
     state, out = np.zeros(len(rate)), np.full(len(t), T0)
     for i, h in enumerate(np.diff(t), start=1):

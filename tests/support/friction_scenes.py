@@ -27,8 +27,14 @@ def lawful(scene: Scene, word: str, text: str | None = None, **values: Any) -> S
 
 
 @cache
-def heated(**effects: Any) -> Result:
-    """Quick strokes of small patches under a real load: what heats."""
+def heated(thickness: float = 0.0, hold: float = 0.0, **effects: Any) -> Result:
+    """Quick strokes of small patches under a real load: what heats. Then the base is at rest for `hold` [s].
+
+    thickness: of the heated plates [m]; 0: half-spaces.
+    """
     motion = Motion.harmonic(0.08, 1.0, cycles=2.0)
-    scene = scene_of("fenz-test2", {"dimension": "planar", **effects}, {"rtol": 1e-5}, motion=motion)
-    return simulate(lawful(scene, "pvt", reference_pressure=P_REF, patch_radius=RADIUS))
+    motion = motion.held(hold) if hold else motion
+    scene = scene_of("fenz-test2", {"dimension": "planar", **effects}, {"rtol": 1e-5}, motion=motion, duration=None)
+    values = {"plate_thickness": thickness} if thickness else {}
+    law = "pvtd" if thickness else "pvt"
+    return simulate(lawful(scene, law, reference_pressure=P_REF, patch_radius=RADIUS, **values))

@@ -153,7 +153,8 @@ int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, doubl
     memset(&w, 0, sizeof w);
 #endif
 #if MSFP_MEMORY
-    point.gain = gain;
+    for (int j = 0; j < MSFP_GAINS; ++j)
+        point.gain[j] = gain;
 #endif
     point.foot_beta = beta;
     weights.q_weight = q_weight, weights.v_weight = v_weight, weights.a_weight = a_weight, weights.beta = beta;

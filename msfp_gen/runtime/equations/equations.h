@@ -8,6 +8,13 @@
 #include <math.h>
 #include "msfp_model.h"
 
+#if MSFP_PACED
+#define MSFP_IF_PACED(...) , __VA_ARGS__ /* one more argument where the memories of surfaces have a pace */
+#define MSFP_RATE(pace, lambda) ((pace) * (lambda))
+#else
+#define MSFP_IF_PACED(...)
+#define MSFP_RATE(pace, lambda) (lambda)
+#endif
 #if MSFP_LAW
 #define MSFP_IF_LAW(...) , __VA_ARGS__ /* one more argument where the friction coefficient is an unknown */
 #else
@@ -182,13 +189,15 @@ void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
 #if MSFP_MEMORY
 /* Memories of a stage with diagonal entry beta [s], for its evaluation, from what the earlier stages give; at beta = 0
  * those of a state. */
-void msfp_memory_point(const msfp_state *from, double beta, msfp_point *at);
+void msfp_memory_point(const msfp_state *from, double beta, msfp_point *at MSFP_IF_PACED(const msfp_parameters *p));
 /* Parts of the memories after the evaluation in `w`, and their rates, into `s`. */
-void msfp_memory_state(const msfp_work *w, const msfp_state *from, double beta, msfp_state *s);
+void msfp_memory_state(const msfp_work *w, const msfp_state *from, double beta,
+                       msfp_state *s MSFP_IF_PACED(const msfp_parameters *p));
 /* Of one surface, or of its columns, of which each number has `width`: the sum of the parts without the source; the parts
  * and their rates by the source. */
-void msfp_memory_past(const double *parts, double beta, int width, double *past);
-void msfp_memory_stage(const double *from, const double *source, double beta, int width, double *parts, double *rates);
+void msfp_memory_past(const double *parts, double beta, int width, double *past MSFP_IF_PACED(double pace));
+void msfp_memory_stage(const double *from, const double *source, double beta, int width, double *parts,
+                       double *rates MSFP_IF_PACED(double pace));
 /* Largest error of a memory over its tolerance [-]; error: its estimate, s: the end of the step. */
 double msfp_memory_error(const msfp_run *run, const msfp_state *error, const msfp_state *s, double beta);
 #else
@@ -196,8 +205,8 @@ double msfp_memory_error(const msfp_run *run, const msfp_state *error, const msf
 #undef msfp_memory_point
 #undef msfp_memory_state
 #undef msfp_memory_error
-#define msfp_memory_point(from, beta, at) ((void)0)
-#define msfp_memory_state(w, from, beta, s) ((void)0)
+#define msfp_memory_point(...) ((void)0)
+#define msfp_memory_state(...) ((void)0)
 #define msfp_memory_error(run, error, s, beta) 0.0
 #endif
 

@@ -109,7 +109,7 @@ MSFP_WIDE void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, c
         before[MSFP_FRICTION_PREVIOUS_BETA] = weights ? weights->beta : 0.0;
 #if MSFP_MEMORY
         before[MSFP_FRICTION_PREVIOUS_PAST] = at->past[j];
-        before[MSFP_FRICTION_PREVIOUS_GAIN] = at->gain;
+        before[MSFP_FRICTION_PREVIOUS_GAIN] = at->gain[MSFP_GAIN(j)];
 #endif
     }
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);

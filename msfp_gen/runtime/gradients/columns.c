@@ -150,7 +150,8 @@ MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_param
         memcpy(ds.friction_previous[j] + MSFP_FRICTION_PREVIOUS_BETA * C, dat->beta, sizeof dat->beta);
 #if MSFP_MEMORY
         memcpy(ds.friction_previous[j] + MSFP_FRICTION_PREVIOUS_PAST * C, dat->past[j], sizeof dat->past[j]);
-        memcpy(ds.friction_previous[j] + MSFP_FRICTION_PREVIOUS_GAIN * C, dat->gain, sizeof dat->gain);
+        memcpy(ds.friction_previous[j] + MSFP_FRICTION_PREVIOUS_GAIN * C, dat->gain[MSFP_GAIN(j)],
+               sizeof(msfp_columns));
 #endif
     }
     msfp_forces_directions(p, dp, w, d, &s, &ds);

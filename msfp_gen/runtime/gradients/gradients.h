@@ -30,7 +30,7 @@ typedef struct {
     msfp_columns foot[2], foot_beta, beta;
     double slip[MSFP_NB][MSFP_SLIP_SIZE * MSFP_COLUMNS]; /* of a quasi-static step, instead of f */
 #if MSFP_MEMORY
-    msfp_columns past[MSFP_NB], gain;
+    msfp_columns past[MSFP_NB], gain[MSFP_GAINS];
 #endif
 #if MSFP_TOP_ROTATION
     msfp_columns support[2][6];
@@ -277,13 +277,14 @@ void msfp_complete_columns(msfp_run *run, msfp_parameter_batch *batch);
 #if MSFP_MEMORY
 /* Into `dat`, after its columns of beta. from: values and columns of what the earlier stages give. */
 void msfp_memory_point_columns(const msfp_state *from, const msfp_state_columns *dfrom, double beta,
-                             msfp_point_columns *dat);
+                             msfp_point_columns *dat MSFP_IF_PACED(const msfp_parameters *p, const msfp_parameter_columns *dp));
 /* source: its columns, of all surfaces; s: the values of the state. */
 void msfp_memory_state_columns(const msfp_state *s, const msfp_state_columns *dfrom, const msfp_columns source[MSFP_NB],
-                             double beta, const double *dbeta, msfp_state_columns *ds);
+                             double beta, const double *dbeta,
+                             msfp_state_columns *ds MSFP_IF_PACED(const msfp_parameters *p, const msfp_parameter_columns *dp));
 #else
 #undef msfp_memory_point_columns /* its prefixed name, see msfp_symbols.h */
-#define msfp_memory_point_columns(from, dfrom, beta, dat) ((void)0)
+#define msfp_memory_point_columns(...) ((void)0)
 #endif
 
 /* ---- observation.c, work_columns.c: works of the energy balance, where they are asked for ---- */

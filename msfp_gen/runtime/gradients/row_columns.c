@@ -29,7 +29,7 @@ static void observed_columns(msfp_run *run, msfp_parameter_batch *batch, const m
     memcpy(dat.a, ds->a, sizeof dat.a);
     memcpy(dat.f, ds->f, sizeof dat.f);
     memcpy(dat.foot, ds->foot, sizeof dat.foot);
-    msfp_memory_point_columns(s, ds, 0.0, &dat);
+    msfp_memory_point_columns(s, ds, 0.0, &dat MSFP_IF_PACED(p, &batch->parameters));
     msfp_condensed_columns(p, &batch->parameters, &o->at, &dat, &o->weights, &o->work, &o->slopes, MSFP_OF_ROW, dw);
     msfp_record_columns(p, &batch->parameters, &o->at, &dat, &o->work, dw, d);
     memcpy(d[MSFP_ROW_WORK], ds->work, sizeof ds->work);

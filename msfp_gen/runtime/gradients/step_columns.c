@@ -32,7 +32,8 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_parameter_batch *batch,
         dat->beta[c] = dat->foot_beta[c] = method->gamma * batch->h[c];
         dat->foot[0][c] += beta * dat->foot[1][c] + dat->beta[c] * stage_history->stage[i].at.foot[1];
     }
-    msfp_memory_point_columns(&stage_history->stage[i].from, from, beta, dat);
+    msfp_memory_point_columns(&stage_history->stage[i].from, from, beta,
+                              dat MSFP_IF_PACED(&run->parameters, &batch->parameters));
 }
 
 /* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta, at stage i. */
@@ -131,7 +132,8 @@ MSFP_INLINE void stage_state(msfp_run *run, msfp_parameter_batch *batch, int i, 
         memcpy(source[j], batch->work.contact[j] + MSFP_CONTACT_SOURCE * C, sizeof source[j]);
         add_rates(w->drates[j][MSFP_FRICTION_FORCE_SIZE], x, source[j]);
     }
-    msfp_memory_state_columns(&stage_history->state[i], from, (const msfp_columns *)source, stage->beta, dat->beta, to);
+    msfp_memory_state_columns(&stage_history->state[i], from, (const msfp_columns *)source, stage->beta, dat->beta,
+                              to MSFP_IF_PACED(&run->parameters, &batch->parameters));
 #endif
     memcpy(to->work, from->work, sizeof to->work);
     memset(to->power, 0, sizeof to->power);

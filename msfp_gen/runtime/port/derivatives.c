@@ -106,22 +106,25 @@ static void point(const state_columns *known, double beta, state_columns *stage,
 }
 
 /* What the stage formulas of friction, memory and foot know of the earlier stages. */
-static void known_of_stage(const state_columns *known, double beta, msfp_by_ends *d)
+static void known_of_stage(const msfp_parameters *p, const state_columns *known, double beta, msfp_by_ends *d)
 {
     for (int j = 0; j < NB; ++j) {
         memcpy(d->friction_previous[j] + MSFP_FRICTION_PREVIOUS_Y * W, known->f[j],
                MSFP_FRICTION_FORCE_SIZE * sizeof(columns));
 #if MSFP_MEMORY
-        msfp_memory_past(known->memory[j][0], beta, W, d->friction_previous[j] + MSFP_FRICTION_PREVIOUS_PAST * W);
+        msfp_memory_past(known->memory[j][0], beta, W,
+                         d->friction_previous[j] + MSFP_FRICTION_PREVIOUS_PAST * W MSFP_IF_PACED(p->surface[j][MSFP_PACE]));
 #endif
     }
+    (void)p;
     for (int c = 0; c < W; ++c)
         d->foot_stage[MSFP_FOOT_STAGE_Y * W + c] = known->foot[0][c] + beta * known->foot[1][c];
     memcpy(d->foot_stage + MSFP_FOOT_STAGE_Y1 * W, known->foot[1], sizeof(columns));
 }
 
 /* Y and Z, foot and memories of the solved stage, with their rates. */
-static void rest_of_stage(const state_columns *known, double beta, const msfp_by_ends *d, state_columns *stage)
+static void rest_of_stage(const msfp_parameters *p, const state_columns *known, double beta, const msfp_by_ends *d,
+                          state_columns *stage)
 {
     memcpy(stage->f, known->f, sizeof stage->f);
     memcpy(stage->foot, known->foot, sizeof stage->foot);
@@ -129,9 +132,10 @@ static void rest_of_stage(const state_columns *known, double beta, const msfp_by
         memcpy(stage->df[j], d->contact[j] + MSFP_CONTACT_DY * W, MSFP_FRICTION_FORCE_SIZE * sizeof(columns));
 #if MSFP_MEMORY
         msfp_memory_stage(known->memory[j][0], d->contact[j] + MSFP_CONTACT_SOURCE * W, beta, W, stage->memory[j][0],
-                          stage->dmemory[j][0]);
+                          stage->dmemory[j][0] MSFP_IF_PACED(p->surface[j][MSFP_PACE]));
 #endif
     }
+    (void)p;
     memcpy(stage->dfoot, d->foot + MSFP_FOOT_Y1 * W, sizeof stage->dfoot);
     msfp_add(stage->f[0][0], stage->df[0][0], beta, 2 * NB * W);
     msfp_add(stage->foot[0], stage->dfoot[0], beta, 2 * W);
@@ -175,14 +179,14 @@ static void differentiate_stage(const msfp_port *port, const msfp_run *run, cons
             }
     move_base(&run->parameters, &run->work, here[0], s, &m->d);
     move_top(port, &run->work, here[1], s, &m->d);
-    known_of_stage(&known, beta, &m->d);
+    known_of_stage(&run->parameters, &known, beta, &m->d);
     memset(stage, 0, sizeof *stage);
     point(&known, beta, stage, &m->d);
     differentiate(&run->parameters, &run->work, 1, s, &m->d);
     solve(run, residual, &m->d, stage);
     point(&known, beta, stage, &m->d);
     differentiate(&run->parameters, &run->work, balances, s, &m->d);
-    rest_of_stage(&known, beta, &m->d, stage);
+    rest_of_stage(&run->parameters, &known, beta, &m->d, stage);
     if (i == stages->method->stages - 1) /* at the end of the step */
         m->stage[0] = *stage;
 }

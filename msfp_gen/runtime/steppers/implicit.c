@@ -19,7 +19,7 @@ void msfp_stage_begin(msfp_run *run, msfp_stages *s, int i)
     s->now.at.foot[1] = from->foot[1];
     s->now.at.foot_beta = s->now.beta;
     s->now.weights.same_base = 0;
-    msfp_memory_point(from, s->now.beta, &s->now.at);
+    msfp_memory_point(from, s->now.beta, &s->now.at MSFP_IF_PACED(&run->parameters));
 }
 
 /* Rate j of body k at stage i, extrapolated from the earlier stages. */
@@ -117,7 +117,7 @@ void msfp_stage_end(msfp_run *run, msfp_stages *s, int i)
     stage->energy = 0.0; /* known once the step is accepted */
     msfp_state_of(run, &s->now.at, s->now.f, stage);
     msfp_powers_of(run, &s->now.at, stage);
-    msfp_memory_state(&run->work, &s->now.from, s->now.beta, stage);
+    msfp_memory_state(&run->work, &s->now.from, s->now.beta, stage MSFP_IF_PACED(&run->parameters));
     for (int e = 0; e < MSFP_WORKS; ++e)
         stage->work[e] = s->now.from.work[e] + s->h * s->method->gamma * stage->power[e];
     if (run->node_count < MSFP_NODES && i == s->method->nodes[run->node_count]) {

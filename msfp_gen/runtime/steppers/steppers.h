@@ -27,7 +27,7 @@ double msfp_control_order(int method);
 /* Base motion, load and rotation of the support at time t [s], into `at`. */
 void msfp_point_at(msfp_run *run, double t, msfp_point *at);
 /* The integrated quantities of a state, into `at`. */
-void msfp_place(const msfp_state *s, msfp_point *at);
+void msfp_place(const msfp_state *s, msfp_point *at MSFP_IF_PACED(const msfp_parameters *p));
 /* All inputs of an evaluation at a state. */
 void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at);
 /* Weights of the start of the last step, its interpolation nodes and its end in the polynomial through all of them. */
