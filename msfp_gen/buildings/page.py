@@ -13,12 +13,13 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.report.frames import FEWEST, packed
 from msfp_gen.report.page import TERMS as BEARING_TERMS
 from msfp_gen.report.page import Page
+from msfp_gen.results.sign import shown_sign
 
 SCALES = (1, 2, 5, 10, 20, 50, 100)  # of displacements in the view
 SHOWN = 0.12  # displacement in it over the size of the building, about
 TERMS = (
     BEARING_TERMS[0],
-    ("u", "horizontal displacement across a bearing: base less top, less its value at the start."),
+    ("u", "horizontal displacement across a bearing: {words}, less its value at the start."),
     ("N", "compression between a bearing and the building; at rest its share of the weight. Where it falls to zero, "
      "the bearing would lift off."),
     ("base shear", "horizontal force of the ground on all bearings."),
@@ -63,14 +64,15 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
         "ratio": result.axial_force[rows] / scene.axial_loads,
         "left": left,
         "left_surface": np.stack([1.0 + gap.argmin(axis=1) for gap in gaps], axis=1),
-        "mean": mean,
-        "shear": result.base_reaction[rows, :2],
+        "mean": shown_sign().factor * mean,
+        "shear": shown_sign().factor * result.base_reaction[rows, :2],
         "acceleration": np.stack([node[:, 2, :3] for node in nodes], axis=1),
         "drift": drift / heights[: drift.shape[1]] if drift.shape[1] else drift,
     }
     return {
         "peak": int(np.hypot(*mean[:, :2].T).argmax()),
         "azimuth": 0.0,
+        "sign": shown_sign()._asdict(),
         "surfaces": [],
         "nodes": [{"name": node.name, "position": node.position.tolist()} for node in scene.building.nodes],
         "plates": bool(scene.building.columns),

@@ -14,6 +14,7 @@ from msfp_gen.cli.console import (
     Force,
     Progress,
     SceneName,
+    SignOption,
     Workers,
     answer,
     build,
@@ -27,6 +28,7 @@ from msfp_gen.cli.console import (
     show,
 )
 from msfp_gen.common.errors import InputError, RunError
+from msfp_gen.results.sign import DEFAULT, sign_of, using_sign
 
 if TYPE_CHECKING:
     from msfp_gen.studies.calibration import Measurement
@@ -92,6 +94,7 @@ def bound(
         typer.Option(metavar="RECORD", help="A record of the suite that is not run and in no mean; may be repeated."),
     ] = None,
     workers: Workers = None,
+    sign: SignOption = DEFAULT,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -99,6 +102,7 @@ def bound(
 
     Under a suite, -o keeps the numbers of each run as it ends: the same command continues where it was interrupted.
     """
+    sign_of(sign, "--sign")
     if suite is not None:
         _bound_suite(scene, factors, output, suite, leave_out or (), workers, force, as_json)
         return
@@ -121,8 +125,9 @@ def bound(
         bounds = module.bound(chosen, table, force=force, progress=progress)
     answer(bounds.as_dict(), module.bounding_tables(bounds), as_json)
     if output is not None:
-        written = [c.result.to_netcdf(output / f"{c.name}.nc") for c in bounds.cases if c.result is not None]
-        module.plot_bounds(bounds, output / "bounds.png")
+        with using_sign(sign):
+            written = [c.result.to_netcdf(output / f"{c.name}.nc") for c in bounds.cases if c.result is not None]
+            module.plot_bounds(bounds, output / "bounds.png")
         note_written([*written, module.write_quantities(bounds, output / "bounds.csv"), output / "bounds.png"])
     note_exceeded({case.name: case.result.verdict for case in bounds.cases if case.result is not None})
     if not bounds.succeeded:

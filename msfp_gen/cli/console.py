@@ -96,7 +96,8 @@ Output = Annotated[
 SignOption = Annotated[
     str,
     typer.Option(
-        metavar="|".join(SIGNS), help="Sign of the displacement across the bearing, and of its force, as shown."
+        metavar="|".join(SIGNS),
+        help="Sign of the displacement across the bearing and of its force in files and figures.",
     ),
 ]
 

@@ -21,7 +21,7 @@ from msfp_gen.cli.console import (
 )
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output, make_folder
-from msfp_gen.results.sign import DEFAULT, sign_of
+from msfp_gen.results.sign import DEFAULT, sign_of, using_sign
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -75,7 +75,7 @@ def plot(
     """Draw a run: one figure, or all of them."""
     _check_figure_output(figure, output)
     sign_of(sign, "--sign")
-    from msfp_gen.figures import figures_of, plot_force_path, plot_section, using_sign
+    from msfp_gen.figures import figures_of, plot_force_path, plot_section
 
     loaded = _load_for_figures(source)
     targets = _targets(figure, output, figures_of(loaded))
@@ -126,7 +126,7 @@ def animate(
     Of a building: the frame on its bearings in two elevations, with plan, loops and axial forces.
     """
     from msfp_gen.figures import animate as write_movie
-    from msfp_gen.figures import check_movie, using_sign
+    from msfp_gen.figures import check_movie
 
     check_movie(output, "--output")
     sign_of(sign, "--sign")
@@ -223,6 +223,7 @@ def report(
     no_runs: Annotated[
         bool, typer.Option("--no-runs", help="Make no run of a suite again: no loops, nothing on vertical motion.")
     ] = False,
+    sign: SignOption = DEFAULT,
     force: Force = False,
 ) -> None:
     """Write a run as one HTML file that needs no network: numbers, settings, figures, the bearing in motion.
@@ -239,8 +240,9 @@ def report(
         raise InputError(f"--frames = {count}: give 2 to {MOST}")
     path = check_output(Path(f"{Path(source).stem}.html") if output is None else output, REPORT_SUFFIXES, "--output")
     title = TitleBlock(project, device, date, revision, code, author, checker)
+    sign_of(sign, "--sign")
     if is_suite_folder(source):
-        with Progress("runs made again") as progress:
+        with Progress("runs made again") as progress, using_sign(sign):
             write_analysis(source, path, title, leave_out or (), loops=not no_runs, progress=progress)
         note(f"wrote {path}")
         return
@@ -248,7 +250,7 @@ def report(
         option = "--leave-out" if leave_out else "--no-runs"
         raise InputError(f"{option}: it is for the report of a suite; give the folder of `bound --suite FILE -o DIR`")
     result, failure = result_of(load_source(source), force)
-    with Progress("report") as progress:
+    with Progress("report") as progress, using_sign(sign):
         write_report(result, path, count, progress, title)
     note(f"wrote {path}")
     note_exceeded({"": result.verdict})
@@ -267,6 +269,7 @@ def explore(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE.html", help="The file to write.", show_default=True)
     ] = Path("explorer.html"),
+    sign: SignOption = DEFAULT,
     force: Force = False,
 ) -> None:
     """Write one HTML file in which sliders change a bearing and its motion, and the response is computed at once."""
@@ -280,6 +283,7 @@ def explore(
     first = None if scene is None else load_bearing_scene(scene)
     if first is not None:
         require_meant(first, force=force)
-    with Progress("explorer") as progress:
+    sign_of(sign, "--sign")
+    with Progress("explorer") as progress, using_sign(sign):
         write_explorer(path, first, progress)
     note(f"wrote {path}")

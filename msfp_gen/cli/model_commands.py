@@ -27,7 +27,7 @@ from msfp_gen.cli.console import (
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.output import check_output
 from msfp_gen.jit.library import TARGETS
-from msfp_gen.results.sign import DEFAULT, sign_of
+from msfp_gen.results.sign import DEFAULT, sign_of, using_sign
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 if TYPE_CHECKING:
@@ -274,17 +274,13 @@ def export(
 def _export_rows(source: str, output: Path, columns: str | None, sign: str, force: bool) -> None:
     from msfp_gen.common.tables import TABLE_SUFFIXES
     from msfp_gen.results.files import export_columns
-    from msfp_gen.results.result import Result
-    from msfp_gen.scene.scene import Scene
 
     check_output(output, TABLE_SUFFIXES, "--output")
     names = None if columns is None else [name.strip() for name in columns.split(",")]
     sign_of(sign, "--sign")
-    loaded = load_source(source)
-    if sign != DEFAULT and not isinstance(loaded, Scene | Result):
-        raise InputError(f"--sign = {sign!r}: the columns of this run have one sign, base - top; leave it out")
-    result, failure = result_of(loaded, force)
-    note(f"wrote {export_columns(result, output, names, sign)}")
+    result, failure = result_of(load_source(source), force)
+    with using_sign(sign):
+        note(f"wrote {export_columns(result, output, names)}")
     if failure is not None:
         raise failure
 

@@ -16,6 +16,7 @@ from msfp_gen.cli.console import (
     Output,
     Progress,
     SceneName,
+    SignOption,
     build,
     choices_of,
     note,
@@ -30,6 +31,7 @@ from msfp_gen.cli.console import (
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.fields import to_si
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
+from msfp_gen.results.sign import DEFAULT, sign_of, using_sign
 from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
@@ -206,9 +208,11 @@ def run(
     checkpoint: CheckpointFile = None,
     every: Every = None,
     resume: ResumeFile = None,
+    sign: SignOption = DEFAULT,
     force: Force = False,
 ) -> None:
     """Simulate a scene."""
+    sign_of(sign, "--sign")
     checkpoints = CheckpointOptions.of(checkpoint, every, resume)
     others = {"--rtol": rtol, "--method": method, "--checkpoint": checkpoint, "--resume": resume}
     target = ErrorTarget.of(error, explain, budget, others)
@@ -221,7 +225,9 @@ def run(
     from msfp_gen.scene.file.source import load_scene
 
     chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
-    note_written(_run(chosen, output, plot, as_json, checkpoints, target, strict, force))
+    with using_sign(sign):
+        written = _run(chosen, output, plot, as_json, checkpoints, target, strict, force)
+    note_written(written)
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen demo -o out")

@@ -25,7 +25,7 @@ from msfp_gen.figures.sheet import plot_sheet
 from msfp_gen.figures.style import CASE_COLOURS, COLOURS, FAINT, INK, THIN, distinct, headline, page, panels, plain
 from msfp_gen.report.compared import compared_table
 from msfp_gen.report.frames import picture, render, write_page
-from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of
+from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of, terms_shown
 from msfp_gen.report.repeated import Proceed, plot_loops, plot_vertical, repeat_words, repeated, vertical_table
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.scene import Scene
@@ -127,7 +127,7 @@ def analysis_html(
         outcome=_outcome(bounds),
         verdict="failed" if failed else "exceeded" if exceeded else "within",
         sections=list(_numbered(sections)),
-        terms=TERMS,
+        terms=terms_shown(TERMS),
     )
 
 

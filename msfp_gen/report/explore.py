@@ -20,6 +20,8 @@ from msfp_gen.figures.style import colour
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS, Log, Step, zig_program
 from msfp_gen.report.frames import asset, pieces, render, script_data, write_page
+from msfp_gen.results.sign import shown_sign
+from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import RigTop
 from msfp_gen.simulation.start import first_arguments, needs_settling
@@ -73,6 +75,8 @@ def problem_of(scene: Scene, title: str) -> Problem:
         "state": [np.asarray(value).ravel().tolist() for value in run[5:8]],
         "motion": motion,
         "load": load,
+        "pivot": _pivot(fixed.bearing),
+        "sign": shown_sign()._asdict(),
         "jumps": _packed(run[4]),
         "stops": _packed(options["stops"]),
         "spans": [_packed(options["span_ends"]), _packed(options["span_steps"])],
@@ -91,6 +95,16 @@ def problem_of(scene: Scene, title: str) -> Problem:
         "period": float(str(period)) if (period := fixed.motion.metadata.get("period")) is not None else None,
     }
     return Problem(fixed, spec, data)
+
+
+def _pivot(bearing: Bearing) -> dict[str, Any] | None:
+    """Surfaces on both sides of the pivot, from it outwards, and the distance of each, of friction given there."""
+    if bearing.friction_given_at != "pivot" or bearing.friction_at_pivot is None:
+        return None
+    middle, count = bearing.layout.m, bearing.layout.surfaces
+    interfaces = np.cumsum(bearing.arrays()["height"])[:count]
+    heights = np.abs(interfaces - (interfaces[middle - 1] + interfaces[middle]) / 2)
+    return {"chains": [list(range(middle - 1, -1, -1)), list(range(middle, count))], "heights": heights.tolist()}
 
 
 def fixed_scene(scene: Scene) -> Scene:

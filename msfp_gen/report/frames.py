@@ -25,6 +25,7 @@ from msfp_gen.results.geometry import POINTS, Poses, friction_circles, outline, 
 from msfp_gen.results.history import History
 from msfp_gen.results.joining import at_times
 from msfp_gen.results.result import Result
+from msfp_gen.results.sign import shown_sign
 from msfp_gen.results.sliding import sliding_surfaces
 from msfp_gen.scene.bearing import Bearing
 
@@ -56,8 +57,8 @@ def view(result: Result, count: int = FRAMES) -> dict[str, Any]:
         "line": where.line,
         "force": where.force,
         "base": history.base_displacement,
-        "displacement": history.displacement,
-        "top_force": history.top_force,
+        "displacement": shown_sign().factor * history.displacement,
+        "top_force": shown_sign().factor * history.top_force,
         "sliding": history.sliding,
         "normal": history.normal_force,
         "mobilised": np.linalg.norm(history.friction_state, axis=-1),
@@ -67,6 +68,7 @@ def view(result: Result, count: int = FRAMES) -> dict[str, Any]:
     largest = frames["circle"].max(axis=0)
     return {
         "peak": history.peak_row,
+        "sign": shown_sign()._asdict(),
         "azimuth": main_direction(history.displacement[:, :2]),
         "states": STATES,
         "surfaces": [

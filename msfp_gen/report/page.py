@@ -22,6 +22,7 @@ from msfp_gen.results.files import COUNTER, PROVENANCE, without
 from msfp_gen.results.history import Event
 from msfp_gen.results.note import by_importance
 from msfp_gen.results.result import AnyResult, Result
+from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.explain import explain
 from msfp_gen.studies.calibration import Fit, FittedTest
@@ -42,8 +43,8 @@ TERMS = (
     ("sliding", "distance of a slider from the centre of its dish, along the dish."),
     ("capacity, rim, gap", "the sliding at which the slider meets the raised edge (rim) of its dish; the gap is what "
      "is left until then. A negative gap is the compression of the rim."),
-    ("u", "horizontal displacement across the bearing: base less top, less its value at the start."),
-    ("F", "force of the bearing on what stands on it; it has the sign of u in a loop."),
+    ("u", "horizontal displacement across the bearing: {words}, less its value at the start."),
+    ("F", "force {force}; it has the sign of u in a loop."),
     ("normal force N", "compression through a surface. Where it falls to zero, the surface would open."),
     ("effective stiffness, damping", "of one cycle: force over displacement between its two ends, and the energy of "
      "the loop over 2π times stiffness times displacement squared."),
@@ -52,6 +53,12 @@ TERMS = (
     ("energy balance", "work of the ground and the loads, less all energy stored and dissipated; what remains is the "
      "error of the computation."),
 )  # fmt: skip
+
+
+def terms_shown(terms: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Terms of a page, with what u and F are in the sign that is shown."""
+    sign = shown_sign()
+    return [(term, meaning.format(words=sign.words, force=sign.force)) for term, meaning in terms]
 
 
 @dataclass(frozen=True)
@@ -128,15 +135,15 @@ def outcome(result: AnyResult) -> str:
 
 
 def _event_table(events: Sequence[Event]) -> Table:
-    shown = events[:EVENTS]
+    shown, sign = events[:EVENTS], shown_sign()
     more = f", the first {EVENTS} of {len(events)}" if len(events) > EVENTS else ""
     rows = [
         (
             f"{event.time:.4f}",
             event.kind.replace("_", " "),
             str(event.surface or "-"),
-            *(f"{value * MILLI:.2f}" for value in event.displacement[:2]),
-            *(f"{value * KILO:.3f}" for value in event.top_force[:2]),
+            *(f"{sign.factor * value * MILLI:.2f}" for value in event.displacement[:2]),
+            *(f"{sign.factor * value * KILO:.3f}" for value in event.top_force[:2]),
         )
         for event in shown
     ]
@@ -249,9 +256,9 @@ def report_html(
     return render(
         "page.html.jinja",
         moving=f"The {page.name} in motion",
-        stage=Markup(render(asset(page.stage, page.assets), **data.get("stage", {}))),
+        stage=Markup(render(asset(page.stage, page.assets), sign=shown_sign(), **data.get("stage", {}))),
         lead=f"{page.introduction(result)}, by msfp-gen {result.provenance.get('msfp_gen', __version__)}.",
-        terms=page.terms,
+        terms=terms_shown(page.terms),
         explanation=f"{page.explanation} Charts and views show {shown} instants of {rows} rows; the summary uses all "
         "rows. Click a chart to move to an instant.",
         figures=list(_pictures(result, page.figures, progress)),
@@ -300,7 +307,7 @@ FIT_TERMS = (
     ("correlation of consecutive residuals", "near 0 for independent noise; from 0.5 the page has a note."),
     ("weight", "of the residuals of a test: 2 counts as a standard deviation half as large."),
     ("offset", "constant that is added to the force of the run of one test."),
-    ("u", "displacement across the bearing: base less top. The axis of a figure states its sign."),
+    ("u", "displacement across the bearing: {words}. The axis of a figure states its sign."),
 )  # fmt: skip
 
 
@@ -334,7 +341,7 @@ def fit_html(fit: Fit) -> str:
         settings=explain(fit.scene),
         scene=scene_text(fit.scene),
         provenance=_provenance(fit),
-        terms=FIT_TERMS,
+        terms=terms_shown(FIT_TERMS),
     )
 
 

@@ -21,8 +21,9 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output, replacing, write_bytes
 from msfp_gen.common.tables import TABLE_SUFFIXES, parquet_bytes
 from msfp_gen.motions.motion import Motion
+from msfp_gen.results.gradients import ERROR
 from msfp_gen.results.note import Note
-from msfp_gen.results.sign import DEFAULT, SIGNED, sign_of
+from msfp_gen.results.sign import DEFAULT, SIGNED, shown_sign, sign_of
 from msfp_gen.results.stored_group import Attribute, StoredGroup, stored_groups
 from msfp_gen.results.variables import Arrays, Places, columns_of
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 COUNTER, PROVENANCE = "counter_", "provenance_"  # prefixes of the attributes with counters and provenance
 EDITION = "edition"  # attribute: of the names in a file; that of another version of msfp-gen differs if these do
+TURNED = {f"{event}{name}{error}" for name in SIGNED for event in ("", "event_") for error in ("", ERROR)}
 WORDS = ("scene", "motion", "status", "message", "notes")  # attributes that are texts
 # What h5py, json, tomllib and NumPy raise for content that they cannot read.
 DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
@@ -67,7 +69,8 @@ class Storage:
 def to_netcdf(result: AnyResult, path: str | Path) -> Path:
     """Write the dataset and the scene as netCDF-4 file, completely or not at all; a failed run with its status.
 
-    Derivatives with respect to parameters are in its group `gradient`.
+    Derivatives with respect to parameters are in its group `gradient`. Displacement and force across bearings have the
+    sign of `using_sign`, as the attribute `sign` says.
 
     Raises InputError where the suffix is not .nc or the folder does not exist.
     """
@@ -75,47 +78,48 @@ def to_netcdf(result: AnyResult, path: str | Path) -> Path:
     from xarray.backends import H5NetCDFStore
 
     path = check_output(path, DATASET_SUFFIXES)
-    dataset = result.dataset
+    dataset = signed(result.dataset)
     # The file is made in memory, because HDF5 crashes instead of raising an error when the disk is full.
     content = BytesIO()
     with h5netcdf.File(content, "w") as file:
         dataset.dump_to_store(H5NetCDFStore(file), encoding=_encoding(dataset))
         for name, group in result.groups.items():
+            group = signed(group)
             group.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(group))
     write_bytes(path, [content.getbuffer()])
     return path
 
 
-def to_csv(result: AnyResult, path: str | Path, columns: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
+def to_csv(result: AnyResult, path: str | Path, columns: Sequence[str] | None = None) -> Path:
     """Write a CSV file: one comment, `name [unit]` as header, one line per row; then the origin as # comments.
 
-    The origin is the attributes of the dataset, the events, and the scene as TOML text. columns, sign: as of
+    The origin is the attributes of the dataset, the events, and the scene as TOML text. columns: names as of
     `export_columns`. Raises InputError where the suffix is not .csv or the folder does not exist.
     """
     target = check_output(path, (".csv",))
-    dataset = signed(result.dataset, sign)
+    dataset = signed(result.dataset)
     table = selected_columns(table_of(dataset), columns)
     rows = np.column_stack([column.values for column in table]).tolist()
     title = " ".join(f"{result.title}, status {result.status}".split())
     about = "versions, events and scene stand after them"
     with replacing(target) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"# {title}; {_sign_text(sign)}; {len(rows)} rows; {about}\n")
+        file.write(f"# {title}; {_sign_text()}; {len(rows)} rows; {about}\n")
         file.write(",".join(f"{column.name} [{column.unit}]" for column in table) + "\n")
         file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
         file.writelines(f"# {line}\n" for line in _origin(dataset))
     return target
 
 
-def to_parquet(result: AnyResult, path: str | Path, columns: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
+def to_parquet(result: AnyResult, path: str | Path, columns: Sequence[str] | None = None) -> Path:
     """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file.
 
-    columns, sign: as of `export_columns`. Raises InputError as `to_csv` does.
+    columns: names as of `export_columns`. Raises InputError as `to_csv` does.
     """
     target = check_output(path, (".parquet",))
-    dataset = signed(result.dataset, sign)
+    dataset = signed(result.dataset)
     table = selected_columns(table_of(dataset), columns)
     about = {str(key): str(value) for key, value in dataset.attrs.items()}
-    about |= {"sign": _sign_text(sign), "events": json.dumps(_events(dataset))}
+    about |= {"sign": _sign_text(), "events": json.dumps(_events(dataset))}
     arrays = {(column.name, column.unit): np.ascontiguousarray(column.values) for column in table}
     meanings = {column.name: column.meaning for column in table}
     write_bytes(target, [parquet_bytes(arrays, dict.fromkeys(meanings, "double"), about, meanings)])
@@ -129,7 +133,7 @@ def to_mat(result: AnyResult, path: str | Path) -> Path:
     """
     from scipy.io import savemat
 
-    target, dataset = check_output(path, (".mat",)), result.dataset
+    target, dataset = check_output(path, (".mat",)), signed(result.dataset)
     # One-dimensional arrays become column vectors, as usual in MATLAB, and texts become cells.
     arrays = {str(name): variable.to_numpy() for name, variable in dataset.variables.items()}
     content: dict[str, Any] = {n: v.astype(object) if v.dtype.kind == "U" else v for n, v in arrays.items()}
@@ -164,17 +168,14 @@ def check_result_path(path: str | Path, name: str = "output") -> Path:
     return check_output(path, WRITERS, name)
 
 
-def export_columns(
-    result: AnyResult, path: str | Path, names: Sequence[str] | None = None, sign: str = DEFAULT
-) -> Path:
+def export_columns(result: AnyResult, path: str | Path, names: Sequence[str] | None = None) -> Path:
     """Write some columns of `result` as CSV or Parquet, by the suffix; time is always the first.
 
     names: of columns (`displacement_E1`) or of variables of the dataset, for all of their columns (`sliding`), in the
-    order in which they are written; None: all. sign: of displacement and force across the bearing, a word of
-    `sign.SIGNS`. Raises InputError for another name, another sign or an invalid path.
+    order in which they are written; None: all. Raises InputError for another name or an invalid path.
     """
     target = check_output(path, TABLE_SUFFIXES, "output")
-    return WRITERS[target.suffix.lower()](result, target, names, sign)
+    return WRITERS[target.suffix.lower()](result, target, names)
 
 
 class Column(NamedTuple):
@@ -223,8 +224,8 @@ def _column(variable: xr.DataArray, name: str, values: Array) -> Column:
     return Column(str(variable.name), name, str(variable.attrs["units"]), str(variable.attrs["long_name"]), values)
 
 
-def _sign_text(word: str) -> str:
-    sign = sign_of(word)
+def _sign_text() -> str:
+    sign = shown_sign()
     return f"u = {sign.difference.replace('−', '-')}, F {sign.force}"
 
 
@@ -244,18 +245,19 @@ def _events(dataset: xr.Dataset) -> list[dict[str, Any]]:
     return [dict(zip(names, row, strict=True)) for row in rows]
 
 
-def signed(dataset: xr.Dataset, word: str) -> xr.Dataset:
-    """A dataset with displacement and force across the bearing in another sign, a word of `sign.SIGNS`.
-
-    Raises InputError for another word, and for the dataset of a building.
-    """
-    factor = sign_of(word).factor
-    if factor == 1.0:
+def signed(dataset: xr.Dataset) -> xr.Dataset:
+    """A dataset, or the derivatives in one, with displacement and force across bearings in the sign of `using_sign`."""
+    sign = shown_sign()
+    if sign.word == DEFAULT:
         return dataset
-    if "displacement" not in dataset:
-        raise InputError(f"sign = {word!r}: columns of a building have one sign, base - top; leave it out")
-    changed = [name for base in SIGNED for name in (base, f"event_{base}") if name in dataset]
-    return dataset.assign({name: dataset[name].copy(data=factor * dataset[name] + 0.0) for name in changed})  # no -0.0
+    of_rows = {str(name) for name, variable in dataset.data_vars.items() if {"time", "event"} & set(variable.dims)}
+    changed = {name: dataset[name] for name in of_rows & TURNED}
+    turned = dataset.assign({name: one.copy(data=sign.factor * one + 0.0) for name, one in changed.items()})  # no -0.0
+    for name in changed:
+        about = {"sign": sign.words if "displacement" in name else sign.force}
+        turned[name].attrs = {**changed[name].attrs, **about}
+    turned.attrs["sign"] = sign.word
+    return turned
 
 
 def attributes_of(
@@ -289,7 +291,7 @@ def _encoding(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
 
 
 def _is_read(name: str) -> bool:
-    return name in (*WORDS, "source", EDITION, "extremes", "fidelity") or name.startswith((COUNTER, PROVENANCE))
+    return name in (*WORDS, "source", EDITION, "extremes", "fidelity", "sign") or name.startswith((COUNTER, PROVENANCE))
 
 
 def read_result(path: str | Path, kind_of: Callable[[str], Any]) -> Any:
@@ -332,6 +334,8 @@ def _result_in(root: StoredGroup, kind_of: Callable[[str], Any]) -> Any:
 def _read(root: StoredGroup, about: dict[str, Attribute], kind: Any) -> Any:
     if not all(isinstance(about.get(name), str) for name in WORDS):
         raise ValueError(f"an attribute of {', '.join(WORDS)} is no text")
+    if sign_of(str(about.pop("sign", DEFAULT))).word != DEFAULT:
+        root = root.turning(TURNED - set(kind.storage.derived))
     fields = kind.storage.fields_in(root, about)
     if not str(about["status"]).isidentifier():
         raise ValueError(f"status = {about['status']!r} is no word")

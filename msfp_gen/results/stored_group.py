@@ -27,16 +27,16 @@ Attribute = str | int | float
 class StoredGroup:
     """A group of a file. Methods raise ValueError with the reason where its content is not as expected.
 
-    size: of the file [bytes].
+    size: of the file [bytes]. turned: names of arrays that are stored with the other sign.
     """
 
-    def __init__(self, group: h5py.Group, size: int) -> None:
+    def __init__(self, group: h5py.Group, size: int, turned: Collection[str] = ()) -> None:
         import h5py
 
         for name in group:
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 raise ValueError(f"{name} is a link to another place")
-        self._group, self._size = group, size
+        self._group, self._size, self._turned = group, size, turned
 
     def __contains__(self, name: str) -> bool:
         return name in self._group
@@ -48,7 +48,11 @@ class StoredGroup:
         group = self._group.get(name)
         if not isinstance(group, h5py.Group):
             raise ValueError(f"the group {name} is missing")
-        return StoredGroup(group, self._size)
+        return StoredGroup(group, self._size, self._turned)
+
+    def turning(self, names: Collection[str]) -> StoredGroup:
+        """The same group, of which arrays of these names are read with the other sign."""
+        return StoredGroup(self._group, self._size, names)
 
     def attributes(self, wanted: Callable[[str], bool]) -> dict[str, Attribute]:
         """The attributes with names that are `wanted`, as texts and numbers."""
@@ -67,7 +71,7 @@ class StoredGroup:
         if dataset.shape != shape or dataset.dtype != np.dtype(kind):
             raise ValueError(f"{name} has shape {dataset.shape} and type {dataset.dtype}: expected {shape}")
         self._check_storage(dataset, name, compressed)
-        return dataset[()]
+        return 0.0 - dataset[()] if name in self._turned else dataset[()]
 
     def texts(self, name: str, count: int, words: Collection[str]) -> list[str]:
         """A list of texts, each one of `words`."""

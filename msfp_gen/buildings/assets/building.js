@@ -12,11 +12,11 @@ function addCharts(parent) {
   const add = (chart) => views.push(addChart(parent, chart, show));
   for (const axis of [0, 1]) {
     add({
-      title: `Base shear and displacement along E${"₁₂"[axis]}`, xlabel: `mean u${"₁₂"[axis]} = base − top [mm]`,
+      title: `Base shear and displacement along E${"₁₂"[axis]}`, xlabel: `mean u${"₁₂"[axis]} = ${report.sign.difference} [mm]`,
       ylabel: `base shear V${"₁₂"[axis]} [MN]`, lines: [{ x: u[axis], y: shear[axis], colour: shade(axis) }],
     });
   }
-  add({ title: "Orbit, mean of the bearings", xlabel: "u₁ = base − top [mm]", ylabel: "u₂ = base − top [mm]", equal: true, lines: [{ x: u[0], y: u[1], colour: shade(2) }] });
+  add({ title: "Orbit, mean of the bearings", xlabel: `u₁ = ${report.sign.difference} [mm]`, ylabel: `u₂ = ${report.sign.difference} [mm]`, equal: true, lines: [{ x: u[0], y: u[1], colour: shade(2) }] });
   for (const axis of [0, 1]) {
     const floors = report.nodes.map(({ name }, node) => ({ name, colour: shade(node), x: time, y: column((frame) => at("acceleration", frame, node)[axis]) }));
     add({ title: `Floor accelerations along E${"₁₂"[axis]} at ${report.plates ? "centres of mass" : "nodes"}`, xlabel: "time t [s]", ylabel: "acceleration [m/s²]", timed: true, lines: floors.reverse() });

@@ -12,18 +12,18 @@ function addCharts(parent) {
   const add = (chart) => views.push(addChart(parent, chart, show));
   for (const axis of moving.length ? moving : [0]) {
     add({
-      title: `Force and displacement along E${"₁₂"[axis]}`, xlabel: `${names[axis]} = base − top [mm]`,
-      ylabel: `force on the top F${"₁₂"[axis]} [kN]`, lines: [{ x: u[axis], y: force[axis], colour: colours[axis] }],
+      title: `Force and displacement along E${"₁₂"[axis]}`, xlabel: `${names[axis]} = ${report.sign.difference} [mm]`,
+      ylabel: `force ${report.sign.force} F${"₁₂"[axis]} [kN]`, lines: [{ x: u[axis], y: force[axis], colour: colours[axis] }],
     });
   }
   if (moving.length === 2) {
-    add({ title: "Orbit", xlabel: "u₁ = base − top [mm]", ylabel: "u₂ = base − top [mm]", equal: true, lines: [{ x: u[0], y: u[1], colour: "#009E73" }] });
+    add({ title: "Orbit", xlabel: `u₁ = ${report.sign.difference} [mm]`, ylabel: `u₂ = ${report.sign.difference} [mm]`, equal: true, lines: [{ x: u[0], y: u[1], colour: "#009E73" }] });
   }
   const surfaces = (name, read) => surfaceNumbers.map((j) => ({
     name: `${name} ${j + 1}`, colour: colourOf(j), x: time, y: column((frame) => read(frame, j)),
   }));
   add({
-    title: "Displacement", xlabel: "time t [s]", ylabel: "u = base − top [mm]", timed: true,
+    title: "Displacement", xlabel: "time t [s]", ylabel: `u = ${report.sign.difference} [mm]`, timed: true,
     lines: (moving.length ? moving : [0]).map((axis) => ({ name: names[axis], x: time, y: u[axis], colour: colours[axis] })),
   });
   add({

@@ -230,6 +230,68 @@ def test_the_page_uses_its_window_and_no_more(browser, width):
         browser.set_window_size(1400, 1000)
 
 
+def test_the_loop_stays_in_view_beside_the_sliders_at_700_pixels(browser):
+    """With the last slider in the middle of the window, the whole loop is inside it, and nothing covers the slider."""
+    browser.set_window_size(700, 900)
+    try:
+        choose(browser, "fenz-test2")
+        loop, slider, height, top = browser.execute_script(
+            "const all = document.querySelectorAll('.control'); const last = all[all.length - 1];"
+            "last.scrollIntoView({ block: 'center' });"
+            "const box = (one) => { const b = one.getBoundingClientRect(); return [b.top, b.bottom]; };"
+            "const middle = last.getBoundingClientRect();"
+            "const at = document.elementFromPoint(middle.left + 20, (middle.top + middle.bottom) / 2);"
+            "return [box(find('loop')), box(last), window.innerHeight, last.contains(at)]"
+        )
+        assert 0 <= loop[0] < loop[1] <= height and loop[1] - loop[0] > 150
+        assert loop[1] <= slider[0] < slider[1] <= height and top
+    finally:
+        browser.set_window_size(1400, 1000)
+
+
+def test_the_start_reports_its_progress(browser):
+    """The worker tells each model that it has prepared; the page shows it."""
+    told = browser.execute_async_script(
+        "const done = arguments[arguments.length - 1], told = [];"
+        "const source = new Blob([find('worker').textContent], { type: 'text/javascript' });"
+        "const other = new Worker(URL.createObjectURL(source));"
+        "other.onmessage = ({ data }) => { told.push(data); if (data.ready) { other.terminate(); done(told); } };"
+        "const bytes = explorer.modules.map((text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)));"
+        "other.postMessage({ problems: explorer.problems, modules: bytes });"
+    )
+    count = browser.execute_script("return explorer.modules.length")
+    assert told == [*({"prepared": number} for number in range(1, count + 1)), {"ready": True}]
+    shown = browser.execute_script(
+        "answered({ data: { prepared: 1 } }); return [find('status').textContent, find('progress').value]"
+    )
+    assert shown == [f"starting: model 1 of {count} is ready", pytest.approx(1 / count)]
+
+
+def test_friction_at_the_pivot_is_shown_and_stays_there(browser):
+    """Sliders of a scene that gives it there: nominal numbers, after a change of friction, and of a radius."""
+    nominal = explored_scene("fenz-test2").bearing
+    sheet = nominal.friction_at_pivot
+    given = nominal.replace(friction=list(sheet), friction_at="pivot")
+    pivot = problem_of(replace(explored_scene("fenz-test2"), bearing=given), "a title").data["pivot"]
+    assert problem_of(explored_scene("fenz-test2"), "a title").data["pivot"] is None
+    index = EXPLORED.index("fenz-test2")
+    browser.execute_script("explorer.problems[arguments[0]].pivot = arguments[1]", index, pivot)
+    try:
+        choose(browser, "fenz-test2")
+        read = "return [...document.querySelectorAll('[data-number^=friction]')].map((one) => Number(one.value))"
+        assert browser.execute_script(read) == pytest.approx([100 * value for value in sheet], abs=0.006)
+        settings = "return state.settings.friction"
+        assert browser.execute_script(settings) == [surface.friction for surface in nominal.surfaces]
+        act(browser, SLIDE, "friction 1 at the pivot", 1.2 * sheet[0])
+        act(browser, SLIDE, "radius of surface 4", 1.1 * nominal.surfaces[3].radius)
+        radii = [surface.radius for surface in nominal.surfaces[:3]] + [1.1 * nominal.surfaces[3].radius]
+        wanted = nominal.replace(radius=radii).replace(friction=[1.2 * sheet[0], *sheet[1:]], friction_at="pivot")
+        assert browser.execute_script(settings) == pytest.approx([s.friction for s in wanted.surfaces], rel=1e-9)
+        assert browser.execute_script(read) == pytest.approx([120 * sheet[0], *(100 * v for v in sheet[1:])], abs=0.006)
+    finally:
+        browser.execute_script("explorer.problems[arguments[0]].pivot = null", index)
+
+
 def slide(browser, name, **settings):
     """Move sliders of a preset, which are named with underscores here, and read the page."""
     choose(browser, name)

@@ -10,6 +10,27 @@ const state = { index: 0, settings: null, sent: 0, shown: 0, busy: false, waitin
 const problemAt = (index) => explorer.problems[index];
 const nominalOf = (problem, name) => problem.surfaces.map((row) => row[problem.values.indexOf(name)]);
 
+// Coefficients at the pivot, as a data sheet has them, of those at the surfaces, and the reverse: `friction_at_pivot` and
+// `friction_from_pivot` of the package. `change(own, inner, step, k)` gives the moment and the result of surface k.
+function alongChains({ pivot }, radius, change) {
+  const found = radius.map(() => 0);
+  for (const chain of pivot.chains) {
+    let arm = 0, moment = 0;
+    for (const k of chain) {
+      const next = radius[k] - pivot.heights[k];
+      [moment, found[k]] = change(k, moment, next - arm);
+      arm = next;
+    }
+  }
+  return found;
+}
+
+const atPivot = (problem, friction, radius) => alongChains(problem, radius, (k, inner, step) => [friction[k] * radius[k], (friction[k] * radius[k] - inner) / step]);
+const fromPivot = (problem, sheet, radius) => alongChains(problem, radius, (k, inner, step) => {
+  const moment = Math.max(0, inner + sheet[k] * step);
+  return [moment, moment / radius[k]];
+});
+
 function nominalSettings(problem) {
   return { friction: nominalOf(problem, "friction"), radius: nominalOf(problem, "radius"), load: 1, amplitude: 1, rate: 1, angle: 0 };
 }
@@ -48,13 +69,20 @@ function addControls() {
   const panel = find("controls");
   panel.replaceChildren();
   const ranged = (value, [low, high]) => ({ low: low * value, high: high * value, value });
-  settings.friction.forEach((value, k) => addSlider(panel, {
-    name: `friction of surface ${k + 1}`, ...ranged(value || 0.05, RANGE.friction), value,
-    factor: 100, unit: "%", digits: 2, write: (v) => { settings.friction[k] = v; },
+  // A scene whose friction was given at the pivot keeps it there, whatever its radii.
+  const sheet = problem.pivot && atPivot(problem, settings.friction, settings.radius);
+  const changed = (list, k, v) => {
+    if (list[k] === v) return;
+    list[k] = v;
+    if (sheet) settings.friction = fromPivot(problem, sheet, settings.radius);
+  };
+  (sheet ?? settings.friction).forEach((value, k) => addSlider(panel, {
+    name: sheet ? `friction ${k + 1} at the pivot` : `friction of surface ${k + 1}`, ...ranged(value || 0.05, RANGE.friction), value,
+    factor: 100, unit: "%", digits: 2, write: (v) => changed(sheet ?? settings.friction, k, v),
   }));
   settings.radius.forEach((value, k) => addSlider(panel, {
     name: `radius of surface ${k + 1}`, ...ranged(value, RANGE.radius),
-    factor: 1000, unit: "mm", digits: 0, write: (v) => { settings.radius[k] = v; },
+    factor: 1000, unit: "mm", digits: 0, write: (v) => changed(settings.radius, k, v),
   }));
   if (problem.axialLoad !== null) addSlider(panel, {
     name: "axial load", ...ranged(1, RANGE.load), factor: problem.axialLoad / 1000, unit: "kN", digits: 0,
@@ -90,6 +118,11 @@ function request() {
 function answered({ data }) {
   if (data.ready) {
     choose(0);
+    return;
+  }
+  if (data.prepared !== undefined) {
+    find("status").textContent = `starting: model ${data.prepared} of ${explorer.modules.length} is ready`;
+    find("progress").value = data.prepared / explorer.modules.length;
     return;
   }
   if (data.progress !== undefined) {
@@ -150,19 +183,20 @@ function show({ found, settings, request: begun, cost }) {
   const end = { stopped: "the run met its stop condition", failed: `the run ended with ${found.status}` }[word];
   find("status").textContent = word ? `${end} at ${fixed(found.reached, 3)} s` : "";
   find("status").className = `status ${word}`;
-  const kilo = numbers.force.map((v) => v / 1000);
-  const milli = numbers.path.map((v) => v * 1000);
+  const { factor, difference, force } = problem.sign;
+  const kilo = numbers.force.map((v) => (factor * v) / 1000);
+  const milli = numbers.path.map((v) => factor * v * 1000);
   const blue = problem.colours[0];
   find("loop").replaceChildren();
   const markers = [addChart(find("loop"), {
-    title: "Hysteresis loop", xlabel: "displacement u = base − top [mm]", ylabel: "force on the top support [kN]",
+    title: "Hysteresis loop", xlabel: `displacement u = ${difference} [mm]`, ylabel: `force ${force} [kN]`,
     lines: [{ x: thinned(milli), y: thinned(kilo), colour: blue }],
   }, goTo)];
   find("orbit").replaceChildren();
   find("orbit").hidden = problem.planar;
   if (!problem.planar) markers.push(addChart(find("orbit"), {
-    title: "Orbit in plan", xlabel: "u₁ [mm]", ylabel: "u₂ [mm]", equal: true,
-    lines: [{ x: thinned(numbers.u.map((v) => v[0] * 1000)), y: thinned(numbers.u.map((v) => v[1] * 1000)), colour: blue }],
+    title: "Orbit in plan", xlabel: `u₁ = ${difference} [mm]`, ylabel: `u₂ = ${difference} [mm]`, equal: true,
+    lines: [{ x: thinned(numbers.u.map((v) => factor * v[0] * 1000)), y: thinned(numbers.u.map((v) => factor * v[1] * 1000)), colour: blue }],
   }, goTo));
   const { cycle } = numbers;
   const weight = problem.axialLoad === null ? null : problem.axialLoad * settings.load;

@@ -7,8 +7,11 @@ let problems = [];
 onmessage = ({ data }) => {
   if (data.modules) {
     problems = data.problems.map(decoded);
-    for (const bytes of data.modules) instances.push(new WebAssembly.Instance(new WebAssembly.Module(bytes), {}));
-    for (const { exports } of instances) exports._initialize();
+    for (const bytes of data.modules) {
+      instances.push(new WebAssembly.Instance(new WebAssembly.Module(bytes), {}));
+      instances[instances.length - 1].exports._initialize();
+      postMessage({ prepared: instances.length });
+    }
     postMessage({ ready: true });
     return;
   }
