@@ -40,7 +40,7 @@ def generate(spec: ModelSpec) -> Generated:
         spec: layout and effects.
     """
     from .derive import derive
-    from .drivers import directional_kernels, end_kernels
+    from .drivers import directional_kernels, end_kernels, variable_kernels
     from .emit import emit
     from .lower import lower
 
@@ -48,12 +48,13 @@ def generate(spec: ModelSpec) -> Generated:
     equations = derive(spec)
     times.append(time.perf_counter())
     kernels = tuple(lower(program) for program in equations.programs)
+    by_variables = variable_kernels(equations)
     directional = directional_kernels(equations) if spec.gradients else ()
     by_ends = end_kernels(equations) if spec.effects.permits_moving_ends else ()
     times.append(time.perf_counter())
-    files = emit(equations, kernels, directional, by_ends)
+    files = emit(equations, kernels, by_variables, directional, by_ends)
     times.append(time.perf_counter())
     stages = {name: b - a for name, a, b in zip(("derive", "lower", "emit"), times, times[1:], strict=False)}
-    kernels += directional + by_ends
+    kernels += by_variables + directional + by_ends
     statements = sum(len(k.values) + len(k.partials) + len(k.tangents) for k in kernels)
     return Generated(files, statements, sum(k.operations + k.tangent_operations for k in kernels), stages)

@@ -19,7 +19,8 @@ from msfp_gen.specification.layout import ModelSpec
 
 from . import Generated
 from .derive import Equations, derive
-from .drivers import LENGTHS, part
+from .directions import BY_VARIABLES, directed
+from .drivers import LENGTHS, form_of, part
 from .emit import function
 from .interface import effects_text, environment, surface_values
 from .lower import lower
@@ -43,6 +44,11 @@ WIDTH = 8  # columns of a Jacobian that are computed at once
 FILES = ("kernels.h", "equations.h", "equations.c")
 AXES = ("x", "y", "z")
 ANGLES = ("psi", "theta", "phi")
+BY_GIVEN = replace(
+    BY_VARIABLES,
+    seeds=(*(BY_VARIABLES.seeds or ()), *((name, ("Y", "Z")) for name in ("friction_force", "friction_stage"))),
+)
+"""What is given moves: the variables of a step, and the force and the state of friction, for which nothing solves."""
 MADE = ("body_block", "surface_block", "top_block", "spring_stage", "named_points")  # not part of a schedule
 
 
@@ -139,19 +145,12 @@ def _calls(schedules: Mapping[str, tuple[Pass, ...]]) -> list[Call]:
 
 
 def _programs(equations: Equations, called: set[str]) -> list[Program]:
-    """The programs with one number of columns, and the state of friction among what they are differentiated by."""
-    chosen = []
-    for program in equations.programs:
-        if program.name in called | set(MADE):
-            inputs = [
-                replace(use, active=frozenset({"Y", "Z"}) & {f.name for f in use.block.fields}, moving=True)
-                if program.name == "contact" and use.alias == "h"
-                else use
-                for use in program.inputs
-            ]
-            columns = COLUMNS if program.tangents else ""
-            chosen.append(replace(program, inputs=inputs, columns=columns, lanes=""))
-    return chosen
+    """The programs without derivatives of their own, surface by surface."""
+    return [
+        replace(program, tangents=frozenset(), columns="", lanes="")
+        for program in equations.programs
+        if program.name in called | set(MADE)
+    ]
 
 
 def _plain(text: str) -> str:
@@ -181,8 +180,10 @@ def equations_alone(spec: ModelSpec, example: Any) -> Generated:
     programs = _programs(equations, {name for call in calls for name in call.programs})
     by_name = {program.name: program for program in programs}
     kernels = [lower(program) for program in programs]
+    derivatives = [lower(program) for program in directed(BY_GIVEN, schedules, by_name, equations.blocks).values()]
+    form = form_of(BY_GIVEN, schedules, derivatives)
     blocks = {use.block.name: use.block for program in programs for use in (*program.inputs, program.output) if use}
-    drivers = [part(name, passes, by_name, {}) for name, passes in schedules.items()]
+    drivers = [part(name, passes, by_name, [form]) for name, passes in schedules.items()]
     names = {kind: i for i, kind in enumerate(given(spec))}
     sizes = [prod(shape) for shape in given(spec).values()]
     starts = [sum(sizes[:i]) for i in range(len(sizes))]
@@ -195,6 +196,7 @@ def equations_alone(spec: ModelSpec, example: Any) -> Generated:
         "blocks": list(blocks.values()),
         "lists": [(one.name, parts.block(one).name, LENGTHS[one.per]) for one in lists],
         "functions": [function(kernel) for kernel in kernels],
+        "derivatives": [function(kernel) for kernel in derivatives],
         "drivers": drivers,
         "plain": _plain,
         "width": WIDTH,
@@ -215,6 +217,7 @@ def equations_alone(spec: ModelSpec, example: Any) -> Generated:
         name: _renamed(templates.get_template(f"{template}.jinja").render(context, file=name))
         for name, template in names_of.items()
     }
+    kernels += derivatives
     statements = sum(len(k.values) + len(k.partials) + len(k.tangents) for k in kernels)
     operations = sum(k.operations + k.tangent_operations for k in kernels)
     return Generated(files, statements, operations, {"derive and emit": perf_counter() - begin})

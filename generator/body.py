@@ -80,31 +80,31 @@ def forward(b: Blocks) -> Program:
         "forward",
         "body k from body k-1: (2.1)-(2.6), (3.4)-(3.12), rates by differentiation",
     )
-    par: Symbols = p.read(b.body_parameters, "par", active=False)
-    up: Symbols = p.read(b.body, "u", active=("t1", "t2", "t3", "w", "al", "C", "V", "A"))
-    x: Symbols = p.read(b.coordinates, "x", active=True)
+    par: Symbols = p.read(b.body_parameters, "par")
+    up: Symbols = p.read(b.body, "u")
+    x: Symbols = p.read(b.coordinates, "x")
     out = rotational_motion(p, up, x)
     centre = centre_below(p, up, x)
     out["C"], out["V"], out["A"] = point(p, centre, par["e"], out["t3"])
     out["rc"], out["vc"], out["ac"] = point(p, centre, par["c"], out["t3"])
-    p.write(b.body, out, tangents=[q for q in b.body.quantities if q not in ("rc", "vc")])
+    p.write(b.body, out)
     return p
 
 
 def named_points(b: Blocks, values: ValueBlocks) -> Program:
     """All named points of one body (3.2)-(3.11) with velocity and acceleration."""
     p = Program("named_points", "named points of body k: (3.2)-(3.11) with velocity and acceleration")
-    v: Symbols = p.read(values.body_values, "l", active=False)
-    s: Symbols = p.read(values.sides, "s", active=False)
-    up: Symbols = p.read(b.body, "u", active=False)
-    x: Symbols = p.read(b.coordinates, "x", active=False)
+    v: Symbols = p.read(values.body_values, "l")
+    s: Symbols = p.read(values.sides, "s")
+    up: Symbols = p.read(b.body, "u")
+    x: Symbols = p.read(b.coordinates, "x")
     t3 = rotational_motion(p, up, x)["t3"]
     centre = centre_below(p, up, x)
     distances = {name: p.let(distance) for name, distance in places(v, s).items()}
     out: Symbols = {}
     for name, distance in distances.items():
         out[f"r_{name}"], out[f"v_{name}"], out[f"a_{name}"] = point(p, centre, distance, t3)
-    p.write(b.points, out, tangents=False)
+    p.write(b.points, out)
     return p
 
 
@@ -118,8 +118,8 @@ def weight_and_inertia(p: Program, par: Symbols, body: Symbols, massless: bool) 
 def interface_force(b: Blocks, massless: bool) -> Program:
     """Force through the interface below from the one above: (3.26), (3.28) summed from the top down."""
     p = Program("interface_force", "force below a body from the force above: (3.26), (3.28), summed from the top down")
-    par: Symbols = p.read(b.body_parameters, "par", active=False)
-    body: Symbols = p.read(b.body, "b", active=("ac",))
+    par: Symbols = p.read(b.body_parameters, "par")
+    body: Symbols = p.read(b.body, "b")
     above: Symbols = p.read(b.force, "up")
     p.write(b.force, {"F": add(above["F"], weight_and_inertia(p, par, body, massless))})
     return p
@@ -128,8 +128,8 @@ def interface_force(b: Blocks, massless: bool) -> Program:
 def linear_balance(b: Blocks, massless: bool) -> Program:
     """Residual of the balance of linear momentum (3.26), (3.28)."""
     p = Program("linear_balance", "balance of linear momentum (3.26), (3.28): left side less right side")
-    par: Symbols = p.read(b.body_parameters, "par", active=False)
-    body: Symbols = p.read(b.body, "b", active=("ac",))
+    par: Symbols = p.read(b.body_parameters, "par")
+    body: Symbols = p.read(b.body, "b")
     below: Symbols = p.read(b.force, "lo")
     above: Symbols = p.read(b.force, "up")
     p.write(b.linear, {"r": add(weight_and_inertia(p, par, body, massless), subtract(above["F"], below["F"]))})
@@ -146,9 +146,8 @@ def angular_balance(b: Blocks, massless: bool) -> Program:
         "angular_balance",
         "balance of angular momentum (3.27), (3.29) about the centre of mass: left side less right side, along t_i",
     )
-    par: Symbols = p.read(b.body_parameters, "par", active=False)
-    active = ("t1", "t2", "t3") if massless else ("t1", "t2", "t3", "wp", "alp")
-    body: Symbols = p.read(b.body, "b", active=active)
+    par: Symbols = p.read(b.body_parameters, "par")
+    body: Symbols = p.read(b.body, "b")
     below: Symbols = p.read(b.force, "lo")
     moment_below: Symbols = p.read(b.moment, "ml")
     above: Symbols = p.read(b.force, "up")
@@ -169,7 +168,7 @@ def balances(b: Blocks, spin_locked: bool) -> Program:
     p = Program("balances", "balances of a body (3.26)-(3.29); with locked spin phi'' in place of the axial one")
     linear: Symbols = p.read(b.linear, "f")
     angular: Symbols = p.read(b.angular, "m")
-    x: Symbols = p.read(b.coordinates, "x", active=("phi2",))
+    x: Symbols = p.read(b.coordinates, "x")
     first, second, axial = angular["r"]
     p.write(b.balances, {"F": linear["r"], "M": (first, second, x["phi2"] if spin_locked else axial)})
     return p
@@ -192,13 +191,13 @@ def rate_of_angular_momentum(p: Program, par: Symbols, body: Symbols) -> Vector:
 def body_energy(b: Blocks, massless: bool) -> Program:
     """Kinetic and potential energy of one body relative to the base, and the power of the base acceleration."""
     p = Program("body_energy", "energy of a body in the frame moving with the base")
-    par: Symbols = p.read(b.body_parameters, "par", active=False)
-    body: Symbols = p.read(b.body, "b", active=False)
-    base: Symbols = p.read(b.base_motion, "base", active=False)
+    par: Symbols = p.read(b.body_parameters, "par")
+    body: Symbols = p.read(b.body, "b")
+    base: Symbols = p.read(b.base_motion, "base")
     terms = energy_terms(p, par, body, body["rc"], body["vc"], base)
     if massless:
         terms.update(kinetic=sp.Integer(0), power=sp.Integer(0))
-    p.write(b.energy, terms, tangents=False)
+    p.write(b.energy, terms)
     return p
 
 
@@ -217,7 +216,7 @@ def energy_terms(p: Program, par: Symbols, body: Symbols, r: Vector, v: Vector, 
 def moment_to_world(b: Blocks) -> Program:
     """Moment of an interface from the basis of the body below to E."""
     p = Program("moment_to_world", "moment about the sphere centre: from the basis of the body below to E")
-    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
+    body: Symbols = p.read(b.body, "b")
     local: Symbols = p.read(b.moment, "loc")
     p.write(b.moment, {"M": combine((body["t1"], body["t2"], body["t3"]), local["M"])})
     return p
@@ -240,9 +239,9 @@ def relative_angular_velocity(p: Program, above: Symbols, x: Symbols, lower: Sym
 def slip_rotation(b: Blocks) -> Program:
     """Relative angular velocity at a surface in the basis of the body below it, from which the slip follows."""
     p = Program("slip_rotation", "omega'_above - omega'_below in the basis of the body below (3.12), (3.19)")
-    above: Symbols = p.read(b.body, "a", active=("sp", "cp", "st", "ct"))
-    x: Symbols = p.read(b.coordinates, "x", active=("psi1", "theta1", "phi1"))
-    lower: Symbols = p.read(b.coordinates, "y", active=("phi1",))
+    above: Symbols = p.read(b.body, "a")
+    x: Symbols = p.read(b.coordinates, "x")
+    lower: Symbols = p.read(b.coordinates, "y")
     tilt = {"tilt": above["cp"] * above["ct"]} if "tilt" in b.relative.quantities else {}
     p.write(b.relative, {"dw": relative_angular_velocity(p, above, x, lower), **tilt})
     return p
@@ -253,16 +252,16 @@ def surface_local(b: Blocks, uplift: bool, rims: bool) -> Program:
     p = Program(
         "surface_local", "contact force and omega'_above - omega'_below in the basis of the body below (3.12), (3.19)"
     )
-    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
-    above: Symbols = p.read(b.body, "a", active=("sp", "cp", "st", "ct"))
-    x: Symbols = p.read(b.coordinates, "x", active=("psi1", "theta1", "phi1"))
-    lower: Symbols = p.read(b.coordinates, "y", active=("phi1",))
+    body: Symbols = p.read(b.body, "b")
+    above: Symbols = p.read(b.body, "a")
+    x: Symbols = p.read(b.coordinates, "x")
+    lower: Symbols = p.read(b.coordinates, "y")
     total: Symbols = p.read(b.force, "tot")
     least: Vector = (sp.Integer(0), sp.Integer(0), LEAST_FORCE if uplift else sp.Integer(0))
     relative = relative_angular_velocity(p, above, x, lower)
     contact = project((body["t1"], body["t2"], body["t3"]), total["F"])
     if rims:
-        rim: Symbols = p.read(b.rim, "rim", active=("f",))
+        rim: Symbols = p.read(b.rim, "rim")
         contact = subtract(contact, rim["f"])
     tilt = {"tilt": above["cp"] * above["ct"]} if "tilt" in b.contact_frame.quantities else {}
     p.write(b.contact_frame, {"p": add(contact, least), "dw": relative, **tilt})

@@ -98,8 +98,8 @@ def column_blocks(b: Blocks, planar: bool, angles: tuple[str, ...]) -> Columns:
 def twist(c: Columns) -> Program:
     """Twist of the bodies that a tilt angle turns about its axis, with two time derivatives."""
     p = Program("twist", "twist of all bodies that a tilt angle turns about its axis: (2.4), (2.5), (2.36)")
-    s: Symbols = p.read(c.seed, "s", active=False)
-    axis: Symbols = p.read(c.axis, "x", active=False)
+    s: Symbols = p.read(c.seed, "s")
+    axis: Symbols = p.read(c.axis, "x")
     p.rates = {s["s0"]: s["s1"], s["s1"]: s["s2"]}
     p.declare_rates(axis["C"], axis["V"])
     p.declare_rates(axis["V"], axis["A"])
@@ -112,7 +112,7 @@ def twist(c: Columns) -> Program:
         out |= {f"q{order}": turned, f"t{order}": moved}
         if order < 2:
             turned, moved = p.rate_vector(turned), p.rate_vector(moved)
-    p.write(c.twist, out, tangents=False)
+    p.write(c.twist, out)
     p.lanes = "MSFP_DOF"
     return p
 
@@ -120,8 +120,8 @@ def twist(c: Columns) -> Program:
 def transported_twist(b: Blocks, c: Columns) -> Program:
     """Kinematics of a body after an infinitesimal twist in the fixed frame; used at the top plate."""
     p = Program("transported_twist", "a body after an infinitesimal twist")
-    body: Symbols = p.read(b.body, "b", active=False)
-    s: Symbols = p.read(c.twist, "s")
+    body: Symbols = p.read(b.body, "b")
+    s: Symbols = p.read(c.twist, "s", active=True)
     out = {**body, "t3": add(body["t3"], cross(s["q0"], body["t3"]))}
     for w, al in (("w", "al"), ("wp", "alp")):
         out[w] = add(body[w], s["q1"], cross(s["q0"], body[w]))
@@ -140,26 +140,26 @@ def variation_of_rates(b: Blocks, c: Columns) -> Program:
     p = Program(
         "variation_of_rates", "angular velocity and acceleration of a body after a twist, in the body-fixed frame"
     )
-    body: Symbols = p.read(b.body, "b", active=False)
-    s: Symbols = p.read(c.twist, "s")
+    body: Symbols = p.read(b.body, "b")
+    s: Symbols = p.read(c.twist, "s", active=True)
     alp = add(body["alp"], s["q2"], cross(s["q1"], body["wp"]))
-    p.write(c.turning, {"wp": add(body["wp"], s["q1"]), "alp": alp})
+    p.write(c.turning, {"wp": add(body["wp"], s["q1"]), "alp": alp}, tangents=True)
     return p
 
 
 def transported_force(b: Blocks, c: Columns, massless: bool) -> Program:
     """Force below a body from that above (3.26), (3.28), both in the body-fixed frame, in which gravity rotates."""
     p = Program("transported_force", "force below a body from the force above: (3.26), (3.28) in the body-fixed frame")
-    par: Symbols = p.read(b.body_parameters, "par", active=False)
-    body: Symbols = p.read(b.body, "b", active=False)
-    s: Symbols = p.read(c.twist, "s")
-    above: Symbols = p.read(b.force, "up")
+    par: Symbols = p.read(b.body_parameters, "par")
+    body: Symbols = p.read(b.body, "b")
+    s: Symbols = p.read(c.twist, "s", active=True)
+    above: Symbols = p.read(b.force, "up", active=True)
     gravity: Vector = (sp.Integer(0), sp.Integer(0), par["g"])
     asked = subtract(gravity, cross(s["q0"], gravity))
     if not massless:
         twice = scale(sp.Integer(2), cross(s["q1"], body["vc"]))
         asked = add(asked, body["ac"], cross(s["q2"], body["rc"]), twice, s["t2"])
-    p.write(b.force, {"F": add(above["F"], scale(par["m"], asked))})
+    p.write(b.force, {"F": add(above["F"], scale(par["m"], asked))}, tangents=True)
     return p
 
 
@@ -168,22 +168,24 @@ def transported_wrench(b: Blocks, c: Columns) -> Program:
     p = Program(
         "transported_wrench", "force and moment at the top in the body-fixed frame; the moment in the body's basis"
     )
-    body: Symbols = p.read(b.body, "b", active=False)
-    s: Symbols = p.read(c.twist, "s")
-    force: Symbols = p.read(b.force, "f")
-    moment: Symbols = p.read(b.moment, "m")
+    body: Symbols = p.read(b.body, "b")
+    s: Symbols = p.read(c.twist, "s", active=True)
+    force: Symbols = p.read(b.force, "f", active=True)
+    moment: Symbols = p.read(b.moment, "m", active=True)
     seen = subtract(moment["M"], cross(s["q0"], moment["M"]))
     basis = (body["t1"], body["t2"], body["t3"])
-    p.write(b.top_wrench, {"F": subtract(force["F"], cross(s["q0"], force["F"])), "M": project(basis, seen)})
+    p.write(
+        b.top_wrench, {"F": subtract(force["F"], cross(s["q0"], force["F"])), "M": project(basis, seen)}, tangents=True
+    )
     return p
 
 
 def force_to_local(b: Blocks) -> Program:
     """Interface force of a surface in the basis of the body below."""
     p = Program("force_to_local", "force: from E to the basis of the body below")
-    body: Symbols = p.read(b.body, "b", active=False)
-    force: Symbols = p.read(b.force, "f")
-    p.write(b.force, {"F": project((body["t1"], body["t2"], body["t3"]), force["F"])})
+    body: Symbols = p.read(b.body, "b")
+    force: Symbols = p.read(b.force, "f", active=True)
+    p.write(b.force, {"F": project((body["t1"], body["t2"], body["t3"]), force["F"])}, tangents=True)
     return p
 
 
@@ -195,13 +197,13 @@ def basis_above(p: Program, body: Symbols) -> tuple[Vector, Vector, Vector]:
 def turning_balance(b: Blocks, c: Columns, massless: bool, rows: int) -> Program:
     """(3.27), (3.29) in the body-fixed frame: forces along E, moments in the basis of the body below their surface."""
     p = Program("turning_balance", "balance of angular momentum (3.27), (3.29) in the body-fixed frame")
-    par: Symbols = p.read(b.body_parameters, "par", active=False)
-    body: Symbols = p.read(b.body, "b", active=False)
+    par: Symbols = p.read(b.body_parameters, "par")
+    body: Symbols = p.read(b.body, "b")
     turning: Symbols = p.read(c.turning, "w", active=() if massless else ("wp", "alp"))
-    below: Symbols = p.read(b.force, "lo")
-    moment_below: Symbols = p.read(b.moment, "ml")
-    above: Symbols = p.read(b.force, "up")
-    moment_above: Symbols = p.read(b.moment, "mu")
+    below: Symbols = p.read(b.force, "lo", active=True)
+    moment_below: Symbols = p.read(b.moment, "ml", active=True)
+    above: Symbols = p.read(b.force, "up", active=True)
+    moment_above: Symbols = p.read(b.moment, "mu", active=True)
     lever = p.let(par["e"] - par["c"])
     weighted = p.let_vector(add(scale(par["c"], below["F"]), scale(lever, above["F"])), "g")
     basis = (body["t1"], body["t2"], body["t3"])
@@ -210,7 +212,7 @@ def turning_balance(b: Blocks, c: Columns, massless: bool, rows: int) -> Program
     total = subtract(total, project(basis_above(p, body), moment_below["M"]))
     if not massless:
         total = add(total, project(basis, rate_of_angular_momentum(p, par, {**body, **turning})))
-    p.write(b.angular, {"r": total})
+    p.write(b.angular, {"r": total}, tangents=True)
     p.tangents = frozenset(f.name for f in b.angular.fields[:rows])
     return p
 
@@ -218,13 +220,13 @@ def turning_balance(b: Blocks, c: Columns, massless: bool, rows: int) -> Program
 def local_variation(b: Blocks, c: Columns, angles: tuple[str, ...]) -> Program:
     """Derivatives of slip, force and moment of the surface below a body with respect to each unknown of that body."""
     p = Program("local_variation", "variation of the surface below a body with the unknowns of that body")
-    s: Symbols = p.read(c.seed, "s", active=False)
-    up: Symbols = p.read(b.body, "u", active=False)
-    body: Symbols = p.read(b.body, "b", active=False)
-    x: Symbols = p.read(b.coordinates, "x", active=False)
-    lower: Symbols = p.read(b.coordinates, "y", active=False)
-    force: Symbols = p.read(b.force, "f", active=False)
-    moment: Symbols = p.read(b.moment, "m", active=False)
+    s: Symbols = p.read(c.seed, "s")
+    up: Symbols = p.read(b.body, "u")
+    body: Symbols = p.read(b.body, "b")
+    x: Symbols = p.read(b.coordinates, "x")
+    lower: Symbols = p.read(b.coordinates, "y")
+    force: Symbols = p.read(b.force, "f")
+    moment: Symbols = p.read(b.moment, "m")
     below = (up["t1"], up["t2"], up["t3"])
     seen = p.let_vector(project(basis_above(p, body), moment["M"]), "seen")
     slip = p.let_vector(relative_angular_velocity(p, body, x, lower), "dw")
@@ -252,7 +254,7 @@ def local_variation(b: Blocks, c: Columns, angles: tuple[str, ...]) -> Program:
             "alp": alp,
         }
         out |= {f"{angle}_{name}": quantities[name] for name in c.variation.quantities}
-    p.write(c.variations, out, tangents=False)
+    p.write(c.variations, out)
     return p
 
 

@@ -17,7 +17,7 @@ from .blocks import Blocks
 from .body import tilted_axis
 from .functions import ArcTan2, Modulus, Select
 from .laws import Shear, friction_rates
-from .program import Program, Symbols, Vector, add, combine, cross, dot, project, scale
+from .program import Program, Symbols, Vector, add, combine, cross, derivative, dot, project, scale
 
 ALIGNED = sp.Float("1e-9")
 """Sine of a tilt, and distance [m], below which the direction of a rim force is not resolved."""
@@ -98,10 +98,10 @@ def friction(
 def report_contact(b: Blocks, friction_model: FrictionModel) -> Program:
     """Contact force and moment at given unknowns psi~, theta~, N: (3.13)-(3.19) as stated in PEER 2017/07."""
     p = Program("report_contact", "contact force and moment at given psi~, theta~, N: (3.13)-(3.19)")
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    par: Symbols = p.read(b.surface_parameters, "par")
     x: Symbols = p.read(b.unknowns, "x")
     f: Symbols = p.read(b.friction, "f")
-    loc: Symbols = p.read(b.relative, "loc", active=("dw",))
+    loc: Symbols = p.read(b.relative, "loc")
     base = contact_basis(p, *(p.let(function(x[a])) for a in ("psi", "theta") for function in (sp.sin, sp.cos)))
     shear = Shear(f["Y"], f["Z"], (f["Y"], f["Z"]), par["td"])
     signed_radius, rates = slip(p, friction_model, par, base, shear, x["N"], loc["dw"])
@@ -111,11 +111,7 @@ def report_contact(b: Blocks, friction_model: FrictionModel) -> Program:
     t1, t2, t3 = base
     mu_n = p.let(-par["mu"] * x["N"])
     force = add(scale(x["N"], t3), scale(p.let(mu_n * g["Y"]), t1), scale(p.let(mu_n * g["Z"]), t2))  # (3.15)-(3.17)
-    p.write(
-        b.report_contact,
-        {"p": force, "M": out["M"], "dY": out["dY"], "dZ": out["dZ"], **heat},
-        tangents=("p", "M", "dY", "dZ"),
-    )
+    p.write(b.report_contact, {"p": force, "M": out["M"], "dY": out["dY"], "dZ": out["dZ"], **heat})
     return p
 
 
@@ -145,10 +141,10 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
     p = Program(
         "contact", "contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19)"
     )
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    stage: Symbols = p.read(b.friction_stage, "h", active=False)
-    loc: Symbols = p.read(b.contact_frame, "loc")
-    g: Symbols = p.read(b.friction_force, "g")
+    par: Symbols = p.read(b.surface_parameters, "par")
+    stage: Symbols = p.read(b.friction_stage, "h")
+    loc: Symbols = p.read(b.contact_frame, "loc", active=True)
+    g: Symbols = p.read(b.friction_force, "g", active=True)
     f = {name: p.let(g[name] - stage["rest"] * (g[name] - stage[name])) for name in ("Y", "Z")}
     shear = Shear(f["Y"], f["Z"], (stage["Y"], stage["Z"]), stage["tau"])
     unknown = laws.read_unknown_coefficient(p, b, friction_model.coefficient, par)
@@ -176,22 +172,22 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
 def contact_stage(b: Blocks) -> Program:
     """Constants of the stage formula of Y, Z: f = f_0 + beta df/dt, so that f + T df/dt = f_0 + (beta + T) df/dt."""
     p = Program("contact_stage", "constants of the stage formula of friction, with the damping time of the contact")
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    before: Symbols = p.read(b.friction_previous, "f", active=False)
+    par: Symbols = p.read(b.surface_parameters, "par")
+    before: Symbols = p.read(b.friction_previous, "f")
     tau = p.let(before["beta"] + par["td"])
     rest = Select(tau, par["td"] / p.let(Select(tau, tau, 1)), 1)
     copied = {name: before[name] for name in b.friction_stage.quantities if name not in ("tau", "rest")}
-    p.write(b.friction_stage, {**copied, "tau": tau, "rest": rest}, tangents=False)
+    p.write(b.friction_stage, {**copied, "tau": tau, "rest": rest})
     return p
 
 
 def surface_moment(b: Blocks, rims: bool) -> Program:
     """Moment of a surface on the body above, of contact and rim."""
     p = Program("surface_moment", "moment of contact and rim on the body above, in the basis of the body below")
-    contact_: Symbols = p.read(b.contact, "c", active=("M",))
+    contact_: Symbols = p.read(b.contact, "c")
     moment = contact_["M"]
     if rims:
-        rim_contact: Symbols = p.read(b.rim, "rim", active=("M",))
+        rim_contact: Symbols = p.read(b.rim, "rim")
         moment = add(moment, rim_contact["M"])
     p.write(b.moment, {"M": moment})
     return p
@@ -200,22 +196,22 @@ def surface_moment(b: Blocks, rims: bool) -> Program:
 def gap(b: Blocks) -> Program:
     """Sliding displacement (3.20) and gap (3.21); the arccos is written as an atan2, which is exact at zero tilt."""
     p = Program("gap", "sliding displacement and gap (3.20), (3.21)")
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    above: Symbols = p.read(b.body, "a", active=False)
+    par: Symbols = p.read(b.surface_parameters, "par")
+    above: Symbols = p.read(b.body, "a")
     sine = p.let(norm(above["st"], p.let(above["sp"] * above["ct"])))
     s = p.let(par["R"] * ArcTan2(sine, p.let(above["cp"] * above["ct"])))
-    p.write(b.gap, {"s": s, "g": par["sc"] - s}, tangents=False)
+    p.write(b.gap, {"s": s, "g": par["sc"] - s})
     return p
 
 
 def report_wrench(b: Blocks, rims: bool) -> Program:
     """Force and moment of a surface on the body above, of contact and rim, from the basis of the body below to E."""
     p = Program("report_wrench", "wrench of contact and rim on the body above: from the basis of the body below to E")
-    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
-    contact: Symbols = p.read(b.report_contact, "c", active=("p", "M"))
+    body: Symbols = p.read(b.body, "b")
+    contact: Symbols = p.read(b.report_contact, "c")
     force, moment = contact["p"], contact["M"]
     if rims:
-        rim_contact: Symbols = p.read(b.rim, "rim", active=("f", "M"))
+        rim_contact: Symbols = p.read(b.rim, "rim")
         force = p.let_vector(add(force, rim_contact["f"]), "F")
         moment = p.let_vector(add(moment, rim_contact["M"]), "M")
     basis = (body["t1"], body["t2"], body["t3"])
@@ -226,10 +222,10 @@ def report_wrench(b: Blocks, rims: bool) -> Program:
 def rim_coordinates(b: Blocks) -> Program:
     """Coordinates of the gap of a rim: the tilts of the body above, and with uplift the separation of the surface."""
     p = Program("rim_coordinates", "coordinates on which the gap of a rim depends")
-    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3", "w"))
+    body: Symbols = p.read(b.body, "b")
     angles = ("psi", "theta", "psi1", "theta1")
     separated = "d" in b.coordinates.quantities
-    x: Symbols = p.read(b.coordinates, "x", active=(*angles, "d", "d1") if separated else angles)
+    x: Symbols = p.read(b.coordinates, "x")
     values = {name: x[name] for name in angles}
     if separated:
         basis = (body["t1"], body["t2"], body["t3"])
@@ -250,8 +246,8 @@ def rim(b: Blocks) -> Program:
     so that the energy of the rim is a function of the position (docs/uplift.md).
     """
     p = Program("rim", "rim contact (3.20)-(3.25); applied only while the force is compressive")
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    x: Symbols = p.read(b.rim_coordinates, "x")
+    par: Symbols = p.read(b.surface_parameters, "par")
+    x: Symbols = p.read(b.rim_coordinates, "x", active=True)
     sin_psi, cos_psi = p.let(sp.sin(x["psi"])), p.let(sp.cos(x["psi"]))
     sin_theta, cos_theta = p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))
     above = tilted_axis(p, sin_psi, cos_psi, sin_theta, cos_theta)
@@ -274,7 +270,7 @@ def rim(b: Blocks) -> Program:
     else:
         p.declare_rates(separation, x["d1"])
         sine = p.let(sp.sqrt(above[0] ** 2 + above[1] ** 2 + ALIGNED**2))
-        angle_ratio = p.let(ArcTan2(sine, cosine) / sine)
+        angle_ratio = p.let(p.let(ArcTan2(sine, cosine)) / sine)
         slider, dish = p.let_vector(slider, "slider"), p.let_vector(dish, "dish")
         across = add(separation, scale(-p.let(dot(separation, slider)), slider))
         aside = p.let_vector(add(scale(par["R"] * angle_ratio, toward), scale(par["R"] / lever, across)), "aside")
@@ -288,7 +284,9 @@ def rim(b: Blocks) -> Program:
     else:
         force = p.let_vector(scale(p.let(size / distance), aside), "f")
         # The virtual work of the force over a rotation of the dish, which changes the angle and the projection.
-        slope = p.let((angle_ratio * cosine - 1) / sine**2 * dot(force, dish))  # d(angle/sine)/d(cosine)
+        circle = sine**2 + cosine**2  # is constant
+        along = {sine: -derivative(circle, cosine) / derivative(circle, sine)}
+        slope = p.let(p.partial(angle_ratio, cosine, along) * dot(force, dish))
         moment = scale(p.let(-par["sign"] * lever), cross(dish, add(scale(slope, slider), scale(angle_ratio, force))))
     p.write(
         b.rim,

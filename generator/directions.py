@@ -1,13 +1,14 @@
 """Directional derivatives of a schedule: what moves along a set of directions, and what is read of its derivatives.
 
 There is one form of them, in which every input may move. Sets of directions differ in what they move before an
-evaluation, and in their number: with parameters everything moves, with the ends of a two-port what `ENDS` names. What
-follows from it in an evaluation, and which derivatives anything reads, is found by going through the schedule.
+evaluation, and in their number: parameters move everything, the ends of a two-port every input of an evaluation but
+parameters and what is fixed, the variables of a step those that `VARIABLES` names. What follows from it in an
+evaluation, and which derivatives anything reads, is found by going through the schedule.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -15,29 +16,25 @@ import sympy as sp
 from .blocks import Blocks
 from .lower import directional, moving_symbols, symbol_of, symbols_read
 from .program import Program, Use, fields_of
-from .schedule import LISTS, Call, Kept, Schedule, Solve, at_hand, block_of, calls_of, list_name, passes_of
+from .schedule import (
+    COLUMNS,
+    LISTS,
+    VARIABLES,
+    Call,
+    Kept,
+    Schedule,
+    Solve,
+    at_hand,
+    block_of,
+    calls_of,
+    list_name,
+    passes_of,
+)
 
 Entry = tuple[str, str]
 """A list and a field of its block."""
-
-ENDS: Mapping[str, tuple[str, ...]] = {
-    "frame": (),
-    "x": (),
-    "load_force": (),
-    "load_moment": (),
-    "support": (),
-    "lock": (),
-    "friction_force": (),
-    "coefficient": (),
-    "far_end": ("u", "v"),
-    "foot_stage": ("y", "y1"),
-    "friction_previous": ("Y", "Z", "past"),
-}
-"""What the motion of the ends moves before an evaluation: list -> quantities, all where there are none.
-
-A step has a given length, so the constants of its formulas stay. Friction is solved for, and moves with what it follows
-from.
-"""
+Seeds = tuple[tuple[str, tuple[str, ...]], ...]
+"""Lists, each with quantities of its block; those that a model does not have are left out."""
 
 
 @dataclass(frozen=True)
@@ -48,40 +45,53 @@ class Directions:
         name: of the drivers that differentiate along them.
         suffix: of the kernels.
         columns: C constant with their number.
-        moves: what they move before an evaluation, as `ENDS`; None: everything, and every derivative is wanted.
+        parameters: whether parameters move, and with them everything; then every derivative is wanted.
+        seeds: what they move before an evaluation; None: every input that is neither a parameter nor fixed.
+        again: whether kernels compute the results of an evaluation again, where they need them, in the order in which
+            the program adds terms, instead of reading them in the work area.
     """
 
     name: str
     suffix: str
     columns: str
-    moves: Mapping[str, tuple[str, ...]] | None
+    parameters: bool = False
+    seeds: Seeds | None = None
+    again: bool = False
 
 
-BY_PARAMETERS = Directions("directions", "direction", "MSFP_COLUMNS", None)
-BY_ENDS = Directions("by_ends", "by_ends", "MSFP_PORT_FREEDOMS", ENDS)
+BY_PARAMETERS = Directions("directions", "direction", "MSFP_COLUMNS", parameters=True)
+BY_ENDS = Directions("by_ends", "by_ends", "MSFP_PORT_FREEDOMS")
+BY_VARIABLES = Directions(
+    "tangents", "by_variables", COLUMNS, seeds=tuple(part for parts in VARIABLES.values() for part in parts), again=True
+)
 
 
 def directed(
     along: Directions, schedule: Schedule, programs: Mapping[str, Program], blocks: Blocks
 ) -> dict[str, Program]:
-    """The derivatives of the programs of a schedule along a set of directions, by the name of the program."""
+    """The derivatives of the programs of a schedule along a set of directions, by the name of the program.
+
+    Programs without such derivatives are left out, and those that the runtime differentiates itself.
+    """
     calls = [
-        call
-        for call in calls_of(passes_of(schedule))
-        if not isinstance(call.by, Solve) or along.name in call.by.emitted
+        call for call in calls_of(passes_of(schedule)) if not isinstance(call.by, Solve) or along.name in call.by.forms
     ]
     every = [(call, programs[name]) for call in calls for name in call.programs]
-    moving = None if along.moves is None else _moving(every, blocks, along.moves)
+    moving = None if along.parameters else _moving(every, blocks, along.seeds)
     read = None if moving is None else _read(every, blocks, moving)
     found: dict[str, Program] = {}
     for call, program in every:
+        if isinstance(call.by, Solve) and along.name not in call.by.emitted:
+            continue
         places = [one.reads for one, other in every if other is program]
         inputs = [
             _input(use, {list_name(reads[i]) for reads in places}, moving) for i, use in enumerate(program.inputs)
         ]
         results = _written(call, program, blocks)
         wanted = frozenset(name for name, entry in results.items() if read is None or entry in read)
-        found[program.name] = directional(program, along.suffix, along.columns, inputs, wanted, at_hand(call))
+        given = at_hand(call) and not along.again
+        if any(use.active for use in inputs):
+            found[program.name] = directional(program, along.suffix, along.columns, inputs, wanted, given)
     return found
 
 
@@ -96,9 +106,7 @@ def _input(use: Use, lists: set[str], moving: set[Entry] | None) -> Use:
     """An input with what moves as active; lists: those from which it is read."""
     names = (field.name for field in use.block.fields)
     active = frozenset(name for name in names if moving is None or any((one, name) in moving for one in lists))
-    return replace(
-        use, active=active, moving=moving is None or any(LISTS[one].kept is not Kept.PARAMETERS for one in lists)
-    )
+    return replace(use, active=active, moving=bool(active))
 
 
 def _sources(call: Call, program: Program, moving: set[Entry]) -> dict[sp.Symbol, Entry]:
@@ -111,14 +119,23 @@ def _sources(call: Call, program: Program, moving: set[Entry]) -> dict[sp.Symbol
     return found
 
 
-def _moving(every: list[tuple[Call, Program]], blocks: Blocks, moves: Mapping[str, tuple[str, ...]]) -> set[Entry]:
+def _inputs(every: list[tuple[Call, Program]], blocks: Blocks) -> Iterable[Entry]:
+    """The inputs of an evaluation that are neither parameters nor fixed."""
+    written = {list_name(place) for call, _ in every for place in call.writes}
+    for name in dict.fromkeys(list_name(place) for call, _ in every for place in call.reads):
+        if name not in written and LISTS[name].kept is not Kept.PARAMETERS:
+            yield from ((name, field.name) for field in block_of(name, blocks).fields if not field.fixed)
+
+
+def _moving(every: list[tuple[Call, Program]], blocks: Blocks, seeds: Seeds | None) -> set[Entry]:
     """All that moves in an evaluation."""
-    moving: set[Entry] = set()
-    for name, quantities in moves.items():
-        if name != "coefficient" or blocks.coefficient is not None:
+    if seeds is None:
+        moving = set(_inputs(every, blocks))
+    else:
+        moving = set()
+        for name, quantities in seeds:
             block = block_of(name, blocks)
-            given = [one for one in quantities if one in block.quantities] or list(block.quantities)
-            moving |= {(name, field) for field in fields_of(block, given)}
+            moving |= {(name, part) for part in fields_of(block, (q for q in quantities if q in block.quantities))}
     size = -1
     while size != len(moving):  # bodies follow from bodies
         size = len(moving)
@@ -131,13 +148,12 @@ def _moving(every: list[tuple[Call, Program]], blocks: Blocks, moves: Mapping[st
 
 
 def _read(every: list[tuple[Call, Program]], blocks: Blocks, moving: set[Entry]) -> set[Entry]:
-    """The moving entries of which something reads the derivatives: a result, another program or the runtime."""
+    """The entries of which something reads the derivatives: a result, another program or the runtime."""
     lists = {list_name(place) for call, _ in every for place in call.reads}
     read: set[Entry] = set()
     for call, program in every:
         for name, entry in _written(call, program, blocks).items():
-            solved = isinstance(call.by, Solve) and name in call.by.reads
-            if entry in moving and (entry[0] not in lists or solved):
+            if entry[0] not in lists or name in call.differentiated:
                 read.add(entry)
     size = -1
     while size != len(read):

@@ -10,11 +10,10 @@ from typing import Any
 from msfp_gen.specification.layout import Effects
 
 from .derive import Equations
-from .directions import BY_ENDS, BY_PARAMETERS, Directions, directed
+from .directions import BY_ENDS, BY_PARAMETERS, BY_VARIABLES, Directions, directed
 from .lower import Kernel, by_inputs, lower
 from .program import Block, Program
 from .schedule import (
-    COLUMNS,
     LISTS,
     VARIABLES,
     Call,
@@ -35,10 +34,10 @@ from .schedule import (
     condensed,
     energies,
     index_of,
+    list_name,
     list_of,
     momentum_balances,
     passes_of,
-    tangent_of,
     two_port,
     unknowns,
 )
@@ -112,12 +111,14 @@ def _or_null(place: str) -> str:
 Lines = Callable[[Call, Programs], Iterator[Line]]
 
 
-def scheduled_kernels(equations: Equations) -> tuple[Kernel, ...]:
-    """Tangents that the schedules call and that no program has in this form."""
-    effects = equations.spec.effects
-    called = _called(momentum_balances(effects)) | _called(condensed(effects))
-    tangents = ((program, tangent_of(program)) for program in equations.programs if program.name in called)
-    return tuple(lower(tangent) for program, tangent in tangents if tangent is not program)
+def variable_kernels(equations: Equations) -> tuple[Kernel, ...]:
+    """Derivatives of the programs of both forms of the equations by the variables of a step."""
+    return _kernels(equations, with_variables(equations.spec.effects), BY_VARIABLES)
+
+
+def with_variables(effects: Effects) -> Schedule:
+    """The momentum balances and the condensed equations, which share their programs."""
+    return {**momentum_balances(effects), **condensed(effects)}
 
 
 def directional_kernels(equations: Equations) -> tuple[Kernel, ...]:
@@ -154,43 +155,50 @@ def _kernels(equations: Equations, schedule: Schedule, along: Directions) -> tup
 
 @dataclass(frozen=True)
 class Form:
-    """Directional derivatives by one set of directions.
+    """Directional derivatives of a schedule along one set of directions.
 
     Attributes:
-        name: "directions" or "by_ends", as in `Solve`.
+        along: the set.
         kernels: name of a program -> its derivatives.
+        parts: of the schedule.
         read: the lists whose values these contain.
     """
 
-    name: str
+    along: Directions
     kernels: Mapping[str, Kernel]
+    parts: tuple[str, ...]
     read: set[str]
 
 
-def _form(name: str, suffix: str, schedule: Schedule, kernels: Iterable[Kernel]) -> Form:
-    kernel_of = {kernel.program.name.removesuffix(suffix): kernel for kernel in kernels}
-    return Form(name, kernel_of, _read_values(schedule, kernel_of))
+def form_of(along: Directions, schedule: Schedule, kernels: Iterable[Kernel]) -> Form:
+    """The form of some kernels."""
+    kernel_of = {kernel.program.name.removesuffix(f"_{along.suffix}"): kernel for kernel in kernels}
+    return Form(along, kernel_of, tuple(schedule), _read_values(schedule, kernel_of))
 
 
-def schedule_context(equations: Equations, directional: Iterable[Kernel], by_ends: Iterable[Kernel]) -> dict[str, Any]:
+def schedule_context(
+    equations: Equations, by_variables: Iterable[Kernel], directional: Iterable[Kernel], by_ends: Iterable[Kernel]
+) -> dict[str, Any]:
     """Variables of the templates of the schedules. directional, by_ends: the kernels of a model that has these."""
     effects, programs = equations.spec.effects, {program.name: program for program in equations.programs}
     balances, with_directions = momentum_balances(effects), {**condensed(effects), **energies(effects)}
     port = two_port(effects) if effects.permits_moving_ends else {}
-    of_ends = {**condensed(effects), **port}
-    moving = check(passes_of(balances), programs, equations.blocks)
-    moving |= check(passes_of(with_directions), programs, equations.blocks)
+    of_ends, of_variables = {**condensed(effects), **port}, with_variables(effects)
+    for schedule in (balances, with_directions):
+        check(passes_of(schedule), programs, equations.blocks)
     directed = _lists(with_directions)
     used = {name: None for name in LISTS if name in directed or name in _lists(balances) or name in _lists(port)}
-    forms = {
-        along.name: _form(along.name, f"_{along.suffix}", schedule, kernels)
-        for along, schedule, kernels in ((BY_PARAMETERS, with_directions, directional), (BY_ENDS, of_ends, by_ends))
-    }
+    tangents = form_of(BY_VARIABLES, of_variables, by_variables)
+    forms = [tangents]
+    forms += [form_of(BY_PARAMETERS, with_directions, kernels) for kernels in (directional,) if kernels]
+    forms += [form_of(BY_ENDS, of_ends, kernels) for kernels in (by_ends,) if kernels]
     every = {**balances, **with_directions, **port}
+    moving = _moving_lists(tangents, of_variables)
     return {
         "parts": [part(name, passes, programs, forms) for name, passes in every.items()],
         "directed": list(with_directions),
         "of_ends": list(of_ends),
+        "of_variables": list(of_variables),
         "blocks": [_declared(LISTS[name], equations) for name in used if LISTS[name].kept is Kept.HERE],
         "block_tangents": [
             _declared(LISTS[name], equations) for name in used if name in moving and not LISTS[name].tangents
@@ -211,6 +219,13 @@ def schedule_context(equations: Equations, directional: Iterable[Kernel], by_end
     }
 
 
+def _moving_lists(form: Form, schedule: Schedule) -> set[str]:
+    """The lists that have derivatives: those of the variables, and what programs with derivatives write."""
+    return {name for name, _ in form.along.seeds or ()} | {
+        list_name(place) for call in calls_of(passes_of(schedule)) if _has(call, form) for place in call.writes
+    }
+
+
 PLACES = {Over.BASE: "base", Over.BODIES: "body", Over.TOP: "top"}
 
 
@@ -228,11 +243,6 @@ def operations(equations: Equations) -> dict[str, dict[str, int]]:
                 longest = max(lower(programs[name]).operations for name in call.programs)
                 of[PLACES.get(one.over, "surface")] += longest
     return counts
-
-
-def _called(schedule: Schedule) -> dict[str, Call]:
-    """The programs that a schedule calls in emitted C, each with one of its calls."""
-    return {name: call for call in _emitted(schedule) for name in call.programs}
 
 
 def _emitted(schedule: Schedule) -> list[Call]:
@@ -262,11 +272,11 @@ def _read_values(schedule: Schedule, kernels: Mapping[str, Kernel]) -> set[str]:
     return read
 
 
-def part(name: str, passes: Iterable[Pass], programs: Programs, directional: Mapping[str, Form]) -> dict[str, Any]:
+def part(name: str, passes: Iterable[Pass], programs: Programs, along: Iterable[Form]) -> dict[str, Any]:
     """A part of a schedule for the templates: its passes, each with its lines, for values and for derivatives."""
     calls = list(calls_of(passes))
-    forms: dict[str, Lines] = {"values": _values, "tangents": _tangents}
-    forms |= {key: partial(_directions, form=form) for key, form in directional.items() if _has(calls, form)}
+    forms: dict[str, Lines] = {"values": _values}
+    forms |= {form.along.name: partial(_directions, form=form) for form in along if name in form.parts}
     lines = {
         form: [(one, [line for call in one.calls for line in of(call, programs)]) for one in passes]
         for form, of in forms.items()
@@ -289,9 +299,11 @@ def part(name: str, passes: Iterable[Pass], programs: Programs, directional: Map
     }
 
 
-def _has(calls: Iterable[Call], form: Form) -> bool:
-    """Whether a form has the derivatives of calls."""
-    return all(name in form.kernels for call in calls for name in call.programs if not isinstance(call.by, Solve))
+def _has(call: Call, form: Form) -> bool:
+    """Whether a call has derivatives of a form."""
+    if isinstance(call.by, Solve):
+        return form.along.name in call.by.forms
+    return any(name in form.kernels for name in call.programs)
 
 
 def _unused(lines: Iterable[Line]) -> list[str]:
@@ -384,32 +396,6 @@ def _statement(function: str, given: Iterable[str]) -> Line:
     return replace(called, text=f"{called.text};")
 
 
-def _tangents(call: Call, programs: Programs) -> Iterator[Line]:
-    """Statements that differentiate a call by the variables of a step. A tangent stores the values once more."""
-    if isinstance(call.by, Solve):
-        if "tangents" in call.by.forms:
-            yield _statement(*RUNTIME[call.program, "tangents"])
-        return
-    if not any(programs[name].tangents for name in call.programs):
-        return
-    writes = _all_in_c(call.writes, "tangents")
-    yield from _chosen(call, writes, ((name, list(_tangent(call, programs[name], writes))) for name in call.programs))
-
-
-def _tangent(call: Call, program: Program, writes: list[str]) -> Iterator[Line]:
-    reads, values = _all_in_c(call.reads, "values"), _all_in_c(call.writes, "values")
-    moving = _moving(call, program, "tangents")
-    name = f"msfp_{tangent_of(program).name}_tangent"
-    if len(writes) == 1:
-        yield _statement(name, [*reads, *values, *moving, *writes])
-        return
-    yield Line("{")
-    yield Line(f"    double values[{_size(program)}], out[{_size(program)} * {COLUMNS}];")
-    yield _statement(name, [*reads, "values", *moving, "out"]).inside("    ")
-    yield from _copies(writes)
-    yield Line("}")
-
-
 def _moving(call: Call, program: Program, form: str) -> list[str]:
     """C of the derivatives that a program reads."""
     return [_in_c(place, form) for place, use in zip(call.reads, program.inputs, strict=False) if use.moving]
@@ -417,11 +403,13 @@ def _moving(call: Call, program: Program, form: str) -> list[str]:
 
 def _directions(call: Call, programs: Programs, form: Form) -> Iterator[Line]:
     """Statements that differentiate a call along directions, with its values where the work area does not hold them."""
+    if not _has(call, form):
+        return
     if isinstance(call.by, Solve):
         yield from _of_solved(call, form)
         return
-    writes = _all_in_c(call.writes, form.name)
-    names = {place.partition("[")[0] for place in call.writes}
+    writes = _all_in_c(call.writes, form.along.name)
+    names = {list_name(place) for place in call.writes}
     values = any(LISTS[name].kept is Kept.HERE for name in names & form.read)
     many = ((name, list(_direction(call, programs[name], writes, values, form))) for name in call.programs)
     yield from _chosen(call, writes, many)
@@ -429,14 +417,15 @@ def _directions(call: Call, programs: Programs, form: Form) -> Iterator[Line]:
 
 def _of_solved(call: Call, form: Form) -> Iterator[Line]:
     """The same of what the runtime solves: it differentiates this itself, or the derivatives are a program."""
-    if form.name == "directions":
-        yield _statement(*RUNTIME[call.program, form.name])
+    name = form.along.name
+    if (call.program, name) in RUNTIME:
+        yield _statement(*RUNTIME[call.program, name])
     elif call.program in form.kernels:
         derivatives = form.kernels[call.program].program
         # The friction force of the surfaces, for which the runtime solves, is not in a list.
         reads = ["s->g[j]" if place == "friction_force[j]" else _in_c(place, "values") for place in call.reads]
-        given = [*reads, *_all_in_c(call.writes, "values"), *_moving(call, derivatives, form.name)]
-        called = _statement(f"msfp_{derivatives.name}", [*given, *_all_in_c(call.writes, form.name)])
+        given = [*reads, *_all_in_c(call.writes, "values"), *_moving(call, derivatives, name)]
+        called = _statement(f"msfp_{derivatives.name}", [*given, *_all_in_c(call.writes, name)])
         when = _line(WHERE[call.program], "p") if call.program == "foot" else Line(WHERE[call.program])
         yield Line(when.text + called.text, when.names | called.names)
 
@@ -445,8 +434,8 @@ def _direction(call: Call, program: Program, writes: list[str], with_values: boo
     if with_values:
         yield from _evaluated(call, program)
     derivatives = form.kernels[program.name].program
-    values = _all_in_c(call.writes, "values") if at_hand(call) else []
-    given = [*_all_in_c(call.reads, "values"), *values, *_moving(call, derivatives, form.name)]
+    values = _all_in_c(call.writes, "values") if at_hand(call) and not form.along.again else []
+    given = [*_all_in_c(call.reads, "values"), *values, *_moving(call, derivatives, form.along.name)]
     size = f"{_size(program)} * {derivatives.columns}"
     yield from _written(call, f"msfp_{derivatives.name}", given, writes, size)
 

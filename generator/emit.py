@@ -14,7 +14,7 @@ from msfp_gen.specification.friction_laws import HEAT_KERNEL
 from msfp_gen.specification.layout import ModelSpec
 
 from .derive import Equations
-from .drivers import schedule_context, scheduled_kernels
+from .drivers import schedule_context
 from .functions import to_c
 from .interface import checks_context, environment, interface_context, model_name, public_header, word_enums
 from .lower import GRADIENT_COLUMNS, Kernel, contact_lists, jacobian_column, ordered_active_inputs
@@ -230,6 +230,7 @@ def extreme_entries(spec: ModelSpec) -> Iterator[str]:
 def emit(
     equations: Equations,
     kernels: tuple[Kernel, ...],
+    by_variables: tuple[Kernel, ...],
     directional: tuple[Kernel, ...] = (),
     by_ends: tuple[Kernel, ...] = (),
 ) -> dict[str, str]:
@@ -274,8 +275,8 @@ def emit(
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
         **interface_context(spec, shape_of(spec), public_header()),
         "checks": checks_context(spec),
-        "scheduled": [function(k) for k in scheduled_kernels(equations)],
-        "schedule": schedule_context(equations, directional, by_ends),
+        "by_variables": [function(k) for k in by_variables],
+        "schedule": schedule_context(equations, by_variables, directional, by_ends),
     }
     names = {name: name for name in FILES} | {f"{model_name(spec)}.h": "msfp_layout.h"}
     names |= {name: name for name in GRADIENT_FILES if spec.gradients}

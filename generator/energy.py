@@ -20,8 +20,8 @@ def friction_power(b: Blocks, uplift: bool) -> Program:
     slip and the drilling moment dissipate the rest. f: (Y, Z).
     """
     p = Program("friction_power", "powers of friction at one surface")
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    c: Symbols = p.read(b.contact, "c", active=False)
+    par: Symbols = p.read(b.surface_parameters, "par")
+    c: Symbols = p.read(b.contact, "c")
     limit = p.let((c if "mu" in c else par)["mu"] * c["N"], "limit")  # a friction law gives mu with the contact
     depth, T = p.let(limit * yield_displacement(p, uplift, par, c["N"]), "depth"), par["td"]
     stored, damped, all_work = sp.Integer(0), sp.Integer(0), sp.Integer(0)
@@ -33,7 +33,6 @@ def friction_power(b: Blocks, uplift: bool) -> Program:
     p.write(
         b.friction_power,
         {"stored": stored, "damped": damped, "lost": all_work - stored - damped - c["drill"]},
-        tangents=False,
     )
     return p
 
@@ -45,24 +44,24 @@ def rim_energy(b: Blocks) -> Program:
     arms. Where the damper would pull, the rim exerts no force and the damper dissipates what the spring releases.
     """
     p = Program("rim_energy", "energy stored in a closed rim, and power dissipated there")
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    rim: Symbols = p.read(b.rim_motion, "rim", active=False)
+    par: Symbols = p.read(b.surface_parameters, "par")
+    rim: Symbols = p.read(b.rim_motion, "rim")
     lever = p.let(1 - par["pr"] / par["R"], "lever")
     spring, damper = p.let(par["kc"] * rim["g"], "spring"), p.let(par["cc"] * rim["dg"], "damper")
     pushes = p.let(Step(-spring - damper), "pushes")  # (3.23) clamped: docs/model.md, choice 4
     lost = (pushes * damper - (1 - pushes) * spring) * rim["dg"] * lever
-    p.write(b.rim_energy, {"stored": spring * rim["g"] * lever / 2, "lost": lost}, tangents=False)
+    p.write(b.rim_energy, {"stored": spring * rim["g"] * lever / 2, "lost": lost})
     return p
 
 
 def _read_top(p: Program, b: Blocks, rotating_support: bool) -> tuple[Symbols, Symbols, Symbols, Symbols]:
     """Inputs of the programs of the top: parameters, plate, foot, and axis and angular velocity of the support."""
-    par: Symbols = p.read(b.top_parameters, "par", active=False)
-    body: Symbols = p.read(b.body, "b", active=False)
-    foot: Symbols = p.read(b.foot, "f", active=False)
+    par: Symbols = p.read(b.top_parameters, "par")
+    body: Symbols = p.read(b.body, "b")
+    foot: Symbols = p.read(b.foot, "f")
     zero = sp.Integer(0)
     fixed: Symbols = {"e": (zero, zero, sp.Integer(1)), "w": (zero, zero, zero)}
-    support: Symbols = p.read(b.upright, "u", active=False) if rotating_support else fixed
+    support: Symbols = p.read(b.upright, "u") if rotating_support else fixed
     return par, body, foot, support
 
 
@@ -75,7 +74,7 @@ def restraint(b: Blocks, rotating_support: bool) -> Program:
     tilted = subtract(body["t3"], support["e"])
     lean = p.let(dot(tilted, tilted) / 2)  # 1 - t_3 . e, without cancellation at small tilt
     stored = par["k"] * (x**2 + y**2) / 2 + par["kr"] * lean + par["kv"] * settlement**2 / 2
-    p.write(b.restraint, {"stored": stored, "settlement": par["sr"] * settlement}, tangents=False)
+    p.write(b.restraint, {"stored": stored, "settlement": par["sr"] * settlement})
     return p
 
 
@@ -83,10 +82,10 @@ def top_power(b: Blocks, rotating_support: bool) -> Program:
     """Powers of the load on the top plate, of its supports, and of its dampers."""
     p = Program("top_power", "powers of load, moving supports, spin and dampers at the top plate")
     par, body, foot, support = _read_top(p, b, rotating_support)
-    coordinates: Symbols = p.read(b.coordinates, "x", active=False)
-    base: Symbols = p.read(b.base_motion, "base", active=False)
-    force: Symbols = p.read(b.force, "fe", active=False)
-    moment: Symbols = p.read(b.moment, "me", active=False)
+    coordinates: Symbols = p.read(b.coordinates, "x")
+    base: Symbols = p.read(b.base_motion, "base")
+    force: Symbols = p.read(b.force, "fe")
+    moment: Symbols = p.read(b.moment, "me")
     C, V, U, wp = body["C"], body["V"], base["U"], body["wp"]
     load = p.let(dot(force["F"], subtract(V, U)) + dot(moment["M"], wp))
     rig = sum(((par["k"] * (C[i] - par["x0"][i]) + par["c"] * V[i]) * U[i] for i in (0, 1)), sp.Integer(0))
@@ -106,7 +105,6 @@ def top_power(b: Blocks, rotating_support: bool) -> Program:
             "support": spin - p.let(dot((held[0], held[1], held[2]), support["w"])),
             "damped": damped,
         },
-        tangents=False,
     )
     return p
 
@@ -114,12 +112,12 @@ def top_power(b: Blocks, rotating_support: bool) -> Program:
 def base_power(b: Blocks) -> Program:
     """Power of a rotating base, relative to the frame that translates with it."""
     p = Program("base_power", "power of a rotating base")
-    body: Symbols = p.read(b.body, "b", active=False)
-    base: Symbols = p.read(b.base_motion, "base", active=False)
-    force: Symbols = p.read(b.force, "f", active=False)
-    moment: Symbols = p.read(b.moment, "m", active=False)
+    body: Symbols = p.read(b.body, "b")
+    base: Symbols = p.read(b.base_motion, "base")
+    force: Symbols = p.read(b.force, "f")
+    moment: Symbols = p.read(b.moment, "m")
     power = dot(force["F"], subtract(body["V"], base["U"])) + dot(moment["M"], body["wp"])
-    p.write(b.power, {"power": power}, tangents=False)
+    p.write(b.power, {"power": power})
     return p
 
 
@@ -130,38 +128,38 @@ def lock_power(b: Blocks) -> Program:
     tilt squared.
     """
     p = Program("lock_power", "power of the moment that locks the spin of a body")
-    body: Symbols = p.read(b.body, "b", active=False)
-    lock: Symbols = p.read(b.lock, "l", active=False)
-    p.write(b.power, {"power": lock["moment"] * dot(body["t3"], body["wp"])}, tangents=False)
+    body: Symbols = p.read(b.body, "b")
+    lock: Symbols = p.read(b.lock, "l")
+    p.write(b.power, {"power": lock["moment"] * dot(body["t3"], body["wp"])})
     return p
 
 
 def rim_motion(b: Blocks) -> Program:
     """Gap of a rim and its rate, whether it pushes or not."""
     p = Program("rim_motion", "gap of a rim and its rate")
-    rim: Symbols = p.read(b.rim, "rim", active=False)
-    p.write(b.rim_motion, {"g": rim["g"], "dg": rim["dg"]}, tangents=False)
+    rim: Symbols = p.read(b.rim, "rim")
+    p.write(b.rim_motion, {"g": rim["g"], "dg": rim["dg"]})
     return p
 
 
 def unilateral_energy(b: Blocks) -> Program:
     """Elastic energy of a unilateral contact, and power that it dissipates."""
     p = Program("unilateral_energy", "energy of a unilateral contact, and power dissipated there")
-    contact: Symbols = p.read(b.unilateral, "c", active=False)
-    p.write(b.unilateral_energy, {"stored": contact["stored"], "lost": contact["lost"]}, tangents=False)
+    contact: Symbols = p.read(b.unilateral, "c")
+    p.write(b.unilateral_energy, {"stored": contact["stored"], "lost": contact["lost"]})
     return p
 
 
 def works(b: Blocks, rims: bool, uplift: bool) -> Program:
     """The powers whose integrals are the works of a run, from those of bodies, surfaces and top."""
     p = Program("works", "powers whose integrals are the works of a run")
-    energy: Symbols = p.read(b.energy, "e", active=False)
-    top: Symbols = p.read(b.top_power, "t", active=False)
-    base: Symbols = p.read(b.power, "base", active=False)
-    lock: Symbols = p.read(b.power, "lock", active=False)
-    friction: Symbols = p.read(b.friction_power, "f", active=False)
-    rim: Symbols = p.read(b.rim_energy, "rim", active=False) if rims else {"lost": sp.Integer(0)}
-    seat: Symbols = p.read(b.unilateral_energy, "seat", active=False) if uplift else {"lost": sp.Integer(0)}
+    energy: Symbols = p.read(b.energy, "e")
+    top: Symbols = p.read(b.top_power, "t")
+    base: Symbols = p.read(b.power, "base")
+    lock: Symbols = p.read(b.power, "lock")
+    friction: Symbols = p.read(b.friction_power, "f")
+    rim: Symbols = p.read(b.rim_energy, "rim") if rims else {"lost": sp.Integer(0)}
+    seat: Symbols = p.read(b.unilateral_energy, "seat") if uplift else {"lost": sp.Integer(0)}
     prescribed = p.let(top["prescribed"] + base["power"])
     p.write(
         b.works,
@@ -176,7 +174,6 @@ def works(b: Blocks, rims: bool, uplift: bool) -> Program:
             "prescribed": prescribed,
             "load": top["load"],
         },
-        tangents=False,
     )
     return p
 

@@ -139,8 +139,8 @@ def _after_slip(p: Program, plastic: bool, Y: sp.Expr, slip: sp.Expr) -> tuple[s
 def friction_after_slip(b: Blocks, law: str) -> Program:
     """Friction at the end of a step: Y, and the force over -mu N, Y + T dY/dt, of the sheared contact."""
     p = Program("friction_after_slip", "friction after the slip of a step, (3.18) integrated in closed form")
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    step: Symbols = p.read(b.slip, "s", active=False)
+    par: Symbols = p.read(b.surface_parameters, "par")
+    step: Symbols = p.read(b.slip, "s")
     local: Symbols = p.read(b.contact_frame, "loc", active=("dw",))
     per_turn = p.let(-par["sign"] * par["R"] / par["dy"])  # (3.19); in the plane the contact position does not enter
     rate = p.let(per_turn * local["dw"][1])
@@ -150,21 +150,21 @@ def friction_after_slip(b: Blocks, law: str) -> Program:
         g = Clamp(p.let(Y + sheared))
     else:
         g = Y + sheared * p.let(1 - Step(p.let(Y * rate)) * p.let(Y**2))  # (3.18)
-    p.write(b.friction_end, {"Y": Y, "g": g}, columns="1")
+    p.write(b.friction_end, {"Y": Y, "g": g}, tangents=True, columns="1")
     return p
 
 
 def slip_work(b: Blocks, law: str) -> Program:
     """Work of friction over a step, with the mean normal force."""
     p = Program("slip_work", "work that friction stores and dissipates over the slip of a step")
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    step: Symbols = p.read(b.slip, "s", active=False)
-    end: Symbols = p.read(b.slip_end, "e", active=False)
+    par: Symbols = p.read(b.surface_parameters, "par")
+    step: Symbols = p.read(b.slip, "s")
+    end: Symbols = p.read(b.slip_end, "e")
     per_turn = p.let(-par["sign"] * par["R"] / par["dy"])
     _, lost = _after_slip(p, is_plastic(law), step["Y"], p.let(per_turn * step["turn"]))
     size = p.let(p.let(end["N"] * par["mu"]) * par["dy"])
     stored = p.let(end["Y"] ** 2 - step["Y"] ** 2) / 2
-    p.write(b.slip_work, {"stored": size * stored, "lost": size * p.let(lost)}, tangents=False)
+    p.write(b.slip_work, {"stored": size * stored, "lost": size * p.let(lost)})
     return p
 
 
@@ -201,9 +201,10 @@ def add_law_fields(b: Blocks, law: Law | None) -> Blocks:
 
 def _add_memory_fields(b: Blocks, memory: Memory) -> Blocks:
     """The blocks with the fields of what a surface remembers."""
+    gain = f"({memory.unit})/({memory.source_unit})"
     fields = [
         Field("past", memory.unit, f"{memory.meaning}: less its start and what the source of this stage contributes"),
-        Field("gain", f"({memory.unit})/({memory.source_unit})", "what it contributes, per unit; 0 where it is given"),
+        Field("gain", gain, "what it contributes, per unit; 0 where it is given", fixed=True),
     ]
     source = Field("source", memory.source_unit, f"{memory.source}: source of the {memory.meaning}")
     results = [source, Field("memory", memory.unit, memory.meaning), Field("law_mu", "-", "d mu/d mu likewise")]
@@ -275,7 +276,7 @@ def law_results(
         variables[memory.variable] = results["memory"] = p.let(value, memory.variable)
     mu = results["mu"] = coefficient(p, law, par, variables)
     if memory:
-        slopes["law_mu"] = p.partial(mu, c["mu"], constant=(N, slip["u"], slip["v"]))
+        slopes["law_mu"] = p.partial(mu, c["mu"], dict.fromkeys((N, slip["u"], slip["v"]), sp.Integer(0)))
     slope = p.let(p.partial(mu, slip["plastic"]) * p.partial(f["Y"], g["Y"]))
     slopes |= {f"law_{name}": p.let(slope * p.partial(slip["plastic"], f[name])) for name in ("Y", "Z")}
     return results, slopes
@@ -294,7 +295,7 @@ def evaluate_law(
     memory = law.memory
     if memory is None:
         return {**par, "mu": coefficient(p, law, par, variables)}, {}
-    stage: Symbols = p.read(b.friction_stage, "h", active=False)
+    stage: Symbols = p.read(b.friction_stage, "h")
     value = p.let(start_of(memory, par) + stage["past"], memory.variable)
     mu = coefficient(p, law, par, {**variables, memory.variable: value})
     source = source_of(p, memory, par, variables, loc)

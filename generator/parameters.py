@@ -87,8 +87,8 @@ def places(v: Symbols, s: Symbols) -> Symbols:
 def body_block(b: Blocks, scene_values: ValueBlocks) -> Program:
     """Parameters of a body: distances along t3 from the positions (3.2)-(3.11), mass and moments of inertia."""
     p = Program("body_block", "parameters of a body, from (3.2)-(3.11)")
-    v: Symbols = p.read(scene_values.body_values, "b", active=False)
-    s: Symbols = p.read(scene_values.sides, "s", active=False)
+    v: Symbols = p.read(scene_values.body_values, "b")
+    s: Symbols = p.read(scene_values.sides, "s")
     points = places(v, s)
     p.write(
         b.body_parameters,
@@ -100,7 +100,6 @@ def body_block(b: Blocks, scene_values: ValueBlocks) -> Program:
             "ja": v["inertia_axial"],
             "g": s["gravity"],
         },
-        tangents=False,
     )
     return p
 
@@ -108,9 +107,9 @@ def body_block(b: Blocks, scene_values: ValueBlocks) -> Program:
 def surface_block(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> Program:
     """Parameters of a surface; those of the edge that meets the rim are values of its slider."""
     p = Program("surface_block", "parameters of a surface; with uplift the half-angle of its footprint")
-    v: Symbols = p.read(scene_values.surface_values, "v", active=False)
-    slider: Symbols = p.read(scene_values.body_values, "s", active=False)
-    side: Symbols = p.read(scene_values.side, "side", active=False)
+    v: Symbols = p.read(scene_values.surface_values, "v")
+    slider: Symbols = p.read(scene_values.body_values, "s")
+    side: Symbols = p.read(scene_values.side, "side")
     values = {
         "sign": side["sign"],
         "R": v["radius"],
@@ -131,7 +130,7 @@ def surface_block(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> Pro
         half = p.let(Select(WIDEST - half, half, WIDEST))
         values |= {"ks": v["seat_stiffness"], "cs": v["seat_damping"], "ca": sp.cos(half), "sa": sp.sin(half)}
     values |= {name: v[name] for name in effects.surface_numbers}
-    p.write(b.surface_parameters, values, tangents=False)
+    p.write(b.surface_parameters, values)
     return p
 
 
@@ -142,8 +141,8 @@ def top_block(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> Program
     damper then dissipates as much in slow motion as the given one.
     """
     p = Program("top_block", "parameters of the top; with uplift its springs less the compliance of the contacts")
-    v: Symbols = p.read(scene_values.top_values, "v", active=False)
-    around: Symbols = p.read(scene_values.around, "a", active=False)
+    v: Symbols = p.read(scene_values.top_values, "v")
+    around: Symbols = p.read(scene_values.around, "a")
     sprung = p.let(Select(v["vertical_stiffness"], 1, Select(v["vertical_damping"], 1, 0)))
     anchor = (v["anchor_x"], v["anchor_y"], sp.Integer(0))
     parts = b.top_parameters.quantities["x0"]
@@ -164,7 +163,7 @@ def top_block(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> Program
         if effects.uplift:
             share = p.let(1 - stiffness * around["compliance"])
         results |= dict(zip(names, (stiffness / share, damping / share**2), strict=True))
-    p.write(b.top_parameters, {**results, "sr": 1 / share}, tangents=False)
+    p.write(b.top_parameters, {**results, "sr": 1 / share})
     return p
 
 

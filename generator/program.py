@@ -48,11 +48,15 @@ def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
 
 @dataclass(frozen=True)
 class Field:
-    """One stored number of a block; name, unit and meaning become a comment of the emitted C."""
+    """One stored number of a block; name, unit and meaning become a comment of the emitted C.
+
+    fixed: whether nothing that moves in a step changes it: a constant of the formulas of a step, or a value at rest.
+    """
 
     name: str
     unit: str
     meaning: str
+    fixed: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,17 +91,24 @@ class BlockBuilder:
         self.fields: list[Field] = []
         self.quantities: dict[str, tuple[str | sp.Expr, ...]] = {}
 
-    def scalar(self, name: str, unit: str, meaning: str, constant: int | None = None) -> BlockBuilder:
+    def scalar(
+        self, name: str, unit: str, meaning: str, constant: int | None = None, fixed: bool = False
+    ) -> BlockBuilder:
         """Add a scalar; `constant` is its value in a planar model, None where it is stored there too."""
         if self.planar and constant is not None:
             self.quantities[name] = (sp.Integer(constant),)
         else:
-            self.fields.append(Field(name, unit, meaning))
+            self.fields.append(Field(name, unit, meaning, fixed))
             self.quantities[name] = (name,)
         return self
 
     def vector(
-        self, name: str, unit: str, meaning: str, planar: tuple[int | None, int | None, int | None]
+        self,
+        name: str,
+        unit: str,
+        meaning: str,
+        planar: tuple[int | None, int | None, int | None],
+        fixed: bool = False,
     ) -> BlockBuilder:
         """Add a vector; `planar` gives its constant components in a planar model, None for a stored one."""
         parts: list[str | sp.Expr] = []
@@ -105,7 +116,7 @@ class BlockBuilder:
             if self.planar and constant is not None:
                 parts.append(sp.Integer(constant))
             else:
-                self.fields.append(Field(f"{name}{axis}", unit, meaning))
+                self.fields.append(Field(f"{name}{axis}", unit, meaning, fixed))
                 parts.append(f"{name}{axis}")
         self.quantities[name] = tuple(parts)
         return self
@@ -167,13 +178,14 @@ class Program:
     _definitions: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
     _count: int = 0
 
-    def read(self, block: Block, alias: str, active: bool | Iterable[str] = True) -> dict[str, sp.Expr | Vector]:
+    def read(self, block: Block, alias: str, active: bool | Iterable[str] = False) -> dict[str, sp.Expr | Vector]:
         """Declare an input block and return its symbols.
 
         Args:
             block: the record.
             alias: prefix of its symbols.
-            active: quantities with respect to which the program is differentiated; True: all, False: none.
+            active: quantities by which the program is differentiated alone, outside of a schedule (`directions.py`);
+                True: all, False: none.
         """
         names = [f.name for f in block.fields]
         chosen = names if active is True else [] if active is False else fields_of(block, active)
@@ -218,13 +230,13 @@ class Program:
         return (x, y, z)
 
     def partials(
-        self, values: Iterable[sp.Expr], symbol: sp.Expr, constant: Iterable[sp.Expr] = ()
+        self, values: Iterable[sp.Expr], symbol: sp.Expr, given: Mapping[sp.Expr, sp.Expr] | None = None
     ) -> Iterator[sp.Expr]:
         """Derivatives of named values with respect to a symbol, as new statements; zero with respect to a number.
 
-        constant: symbols that are held constant, whatever they follow from.
+        given: derivatives of symbols, whatever these follow from; 0 for what is held constant.
         """
-        rates = {one: sp.Integer(0) for one in constant if one.is_Symbol}
+        rates = {one: slope for one, slope in (given or {}).items() if one.is_Symbol}
         if symbol.is_Symbol:
             rates[symbol] = sp.Integer(1)
         for value in values:
@@ -234,9 +246,9 @@ class Program:
             self.rates = saved
             yield self.let(sp.factor_terms(sp.Add(*terms)), "partial")
 
-    def partial(self, value: sp.Expr, symbol: sp.Expr, constant: Iterable[sp.Expr] = ()) -> sp.Expr:
+    def partial(self, value: sp.Expr, symbol: sp.Expr, given: Mapping[sp.Expr, sp.Expr] | None = None) -> sp.Expr:
         """`partials` of one value."""
-        return next(self.partials((value,), symbol, constant))
+        return next(self.partials((value,), symbol, given))
 
     def declare_rates(self, vector: Vector, rates: Vector) -> None:
         """Declare the time derivative of a vector of symbols, such as (2.36) for a basis vector."""
@@ -250,7 +262,7 @@ class Program:
         self,
         block: Block,
         values: Mapping[str, sp.Expr | Vector],
-        tangents: bool | Iterable[str] = True,
+        tangents: bool | Iterable[str] = False,
         columns: str = "MSFP_DOF",
         alias: str = "out",
         slopes: Iterable[str] = (),
@@ -260,7 +272,7 @@ class Program:
         Args:
             block: the record.
             values: quantity -> its value; every quantity of the block must be given.
-            tangents: quantities whose tangent is emitted; True: all, False: none.
+            tangents: quantities whose tangent by the `active` inputs is emitted; True: all, False: none.
             columns: C constant with the number of columns of the tangent.
             alias: prefix of the output in emitted code and LaTeX.
             slopes: quantities that are derivatives themselves.

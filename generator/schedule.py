@@ -2,8 +2,8 @@
 
 A program (`derive.py`) describes one body or one surface. A schedule states, as data, how the programs of a stack
 follow each other in one evaluation. `drivers.py` prints the C that calls them in up to four forms: the values;
-derivatives with respect to the variables of a step, by the tangents of the programs; derivatives by the motion of the
-ends of a two-port; and, in models with gradients, derivatives with respect to parameters.
+derivatives with respect to the variables of a step; derivatives by the motion of the ends of a two-port; and, in models
+with gradients, derivatives with respect to parameters (`directions.py`).
 
 A place is a block in a list of blocks: `body[k-1]` is the block of the body below body k, `rim[j]` that of surface j,
 which lies between bodies j and j+1. `base` and `top` are the indices of the lowest and of the highest body.
@@ -18,7 +18,6 @@ from enum import Enum
 from msfp_gen.specification.layout import Effects, ModelSpec
 
 from .blocks import Blocks
-from .lower import needed_statements
 from .program import Block, Program
 
 COLUMNS = "MSFP_DOF"
@@ -76,14 +75,12 @@ class Solve:
     Attributes:
         forms: the forms of derivatives (`drivers.py`) that there are: "tangents", "directions", "by_ends".
         emitted: the forms of which the derivatives are a program, which is emitted.
-        reads: results of which the runtime reads the derivatives, beside those that other programs read.
         given: whether it gives the results where it asks for the derivatives.
         fails: whether it may find no solution, with a status at which the evaluation ends.
     """
 
     forms: frozenset[str]
     emitted: frozenset[str] = frozenset()
-    reads: tuple[str, ...] = ()
     given: bool = False
     fails: bool = False
 
@@ -99,9 +96,11 @@ class Call:
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     by: If | Solve | None = None
-    """Whether it acts, or that the runtime solves it; None: the program is called, and so is its tangent."""
+    """Whether it acts, or that the runtime solves it; None: the program is called, and so are its derivatives."""
     adds: bool = False
     """Whether what it writes is added to a block, which is zero at the start of the part."""
+    differentiated: tuple[str, ...] = ()
+    """Results of which the runtime reads the derivatives, beside those that other programs read."""
 
     @property
     def programs(self) -> tuple[str, ...]:
@@ -149,6 +148,7 @@ class List:
         name: name in the record that keeps it.
         kept: the parameters, the work area of an evaluation, or the blocks of the schedules alone.
         per: of what it has one block each.
+        given: whether it is given to an evaluation, so that no program needs to have written it.
         tangents: whether the work area keeps derivatives by the variables of a step, which the steppers read.
         directions: whether the work area keeps derivatives by parameters, likewise.
     """
@@ -157,27 +157,28 @@ class List:
     name: str
     kept: Kept = Kept.HERE
     per: Per = Per.STACK
+    given: bool = False
     tangents: bool = False
     directions: bool = False
 
 
 LISTS: Mapping[str, List] = {
-    "body_parameters": List("body_parameters", "body", Kept.PARAMETERS, Per.BODY),
-    "surface_parameters": List("surface_parameters", "surface", Kept.PARAMETERS, Per.SURFACE),
-    "top_parameters": List("top_parameters", "top", Kept.PARAMETERS),
-    "coefficient": List("coefficient", "coefficient", Kept.WORK, Per.SURFACE),
-    "foot_stage": List("foot_stage", "foot_stage"),
-    "upright": List("upright", "upright"),
+    "body_parameters": List("body_parameters", "body", Kept.PARAMETERS, Per.BODY, given=True),
+    "surface_parameters": List("surface_parameters", "surface", Kept.PARAMETERS, Per.SURFACE, given=True),
+    "top_parameters": List("top_parameters", "top", Kept.PARAMETERS, given=True),
+    "coefficient": List("coefficient", "coefficient", Kept.WORK, Per.SURFACE, given=True),
+    "foot_stage": List("foot_stage", "foot_stage", given=True),
+    "upright": List("upright", "upright", given=True),
     "foot": List("foot", "foot", Kept.WORK, directions=True),
-    "frame": List("body", "frame"),
-    "x": List("coordinates", "x", Kept.WORK, Per.BODY, tangents=True, directions=True),
+    "frame": List("body", "frame", given=True),
+    "x": List("coordinates", "x", Kept.WORK, Per.BODY, given=True, tangents=True, directions=True),
     "body": List("body", "body", Kept.WORK, Per.BODY, tangents=True, directions=True),
-    "load_force": List("force", "load_force"),
-    "load_moment": List("moment", "load_moment"),
+    "load_force": List("force", "load_force", given=True),
+    "load_moment": List("moment", "load_moment", given=True),
     "force": List("force", "force", Kept.WORK, Per.BODY, tangents=True, directions=True),
     "moment": List("moment", "moment", Kept.WORK, Per.BODY, tangents=True, directions=True),
-    "unknowns": List("unknowns", "unknowns", per=Per.SURFACE),
-    "friction": List("friction", "friction", per=Per.SURFACE),
+    "unknowns": List("unknowns", "unknowns", per=Per.SURFACE, given=True),
+    "friction": List("friction", "friction", per=Per.SURFACE, given=True),
     "rim_coordinates": List("rim_coordinates", "rim_coordinates", per=Per.SURFACE),
     "rim": List("rim", "rim", Kept.WORK, Per.SURFACE, directions=True),
     "relative": List("relative", "relative", per=Per.SURFACE),
@@ -186,9 +187,9 @@ LISTS: Mapping[str, List] = {
     "angular": List("angular", "angular", per=Per.BODY),
     "balances": List("balances", "balances", per=Per.BODY),
     "contact_frame": List("contact_frame", "contact_frame", Kept.WORK, Per.SURFACE, directions=True),
-    "friction_previous": List("friction_previous", "friction_previous", per=Per.SURFACE),
+    "friction_previous": List("friction_previous", "friction_previous", per=Per.SURFACE, given=True),
     "friction_stage": List("friction_stage", "friction_stage", Kept.WORK, Per.SURFACE, directions=True),
-    "friction_force": List("friction_force", "friction_force", per=Per.SURFACE),
+    "friction_force": List("friction_force", "friction_force", per=Per.SURFACE, given=True),
     "contact": List("contact", "contact", Kept.WORK, Per.SURFACE, directions=True),
     "local_moment": List("moment", "local_moment", per=Per.SURFACE),
     "unilateral": List("unilateral", "unilateral", Kept.WORK, Per.SURFACE, directions=True),
@@ -197,10 +198,10 @@ LISTS: Mapping[str, List] = {
     "excess": List("linear", "excess", per=Per.SURFACE),
     "joint_moment": List("moment", "joint_moment", per=Per.SURFACE),
     "below": List("moment", "below", Kept.WORK, Per.BODY),
-    "base_motion": List("base_motion", "base_motion"),
+    "base_motion": List("base_motion", "base_motion", given=True),
     "energy": List("energy", "energy"),
     "rim_motion": List("rim_motion", "rim_motion", per=Per.SURFACE),
-    "lock": List("lock", "lock", Kept.WORK, Per.SURFACE, directions=True),
+    "lock": List("lock", "lock", Kept.WORK, Per.SURFACE, given=True, directions=True),
     "restraint": List("restraint", "restraint"),
     "rim_energy": List("rim_energy", "rim_energy"),
     "unilateral_energy": List("unilateral_energy", "unilateral_energy"),
@@ -209,8 +210,8 @@ LISTS: Mapping[str, List] = {
     "lock_power": List("power", "lock_power"),
     "friction_power": List("friction_power", "friction_power"),
     "works": List("works", "works"),
-    "far_end": List("far_end", "far_end"),
-    "support": List("support", "support"),
+    "far_end": List("far_end", "far_end", given=True),
+    "support": List("support", "support", given=True),
     "held": List("moment", "held"),
     "lower": List("end_wrench", "lower"),
     "upper": List("end_wrench", "upper"),
@@ -315,6 +316,7 @@ def momentum_balances(effects: Effects) -> Schedule:
                 "report_contact",
                 ("surface_parameters[j]", "unknowns[j]", "friction[j]", "relative[j]", *remembered),
                 ("report_contact[j]",),
+                differentiated=("dY", "dZ"),
             ),
             Call(
                 "report_wrench",
@@ -392,7 +394,7 @@ def condensed(effects: Effects) -> Schedule:
     law = ("coefficient[j]",) if effects.law is not None else ()
     summed = Call("interface_force", ("body_parameters[j+1]", "body[j+1]", "force[j+1]"), ("force[j]",))
     forms, by_ends = frozenset({"tangents", "directions", "by_ends"}), frozenset({"by_ends"})
-    contact = Solve(forms, by_ends, reads=("dY", "dZ", "mu", "N", "source"), given=True, fails=True)
+    contact = Solve(forms, by_ends, given=True, fails=True)
     moments = (
         Call("surface_moment", ("contact[j]", *rim), ("local_moment[j]",)),
         Call("moment_to_world", ("body[j]", "local_moment[j]"), ("joint_moment[j]" if uplift else "moment[j]",)),
@@ -427,6 +429,7 @@ def condensed(effects: Effects) -> Schedule:
                         ("surface_parameters[j]", "friction_stage[j]", "contact_frame[j]", "friction_force[j]", *law),
                         ("contact[j]",),
                         contact,
+                        differentiated=("dY", "dZ", "mu", "N", "source"),
                     ),
                 ),
             ),
@@ -609,58 +612,22 @@ def unrolled(passes: Iterable[Pass], signs: Sequence[int]) -> Iterator[tuple[Cal
                 yield call, reads, writes
 
 
-def tangent_of(program: Program) -> Program:
-    """The program whose tangent a schedule calls: under another name where its own carries other columns."""
-    if program.columns in ("", COLUMNS):
-        return program
-    return replace(program, name=f"{program.name}_columns", columns=COLUMNS)
-
-
-def check(passes: Iterable[Pass], programs: Mapping[str, Program], blocks: Blocks) -> set[str]:
-    """Raise AssertionError where a place does not fit its program, or a derivative would be lost or is not there.
-
-    Every derivative by the variables of a step that a call reads must have been written by an earlier one, or be one of
-    `VARIABLES`. A call must not take for constant what has derivatives. Of what the runtime differentiates itself only
-    the places are checked.
-
-    Returns:
-        The lists that have derivatives.
-    """
-    moving = {
-        (name, field.name)
-        for parts in VARIABLES.values()
-        for name, _ in parts
-        for field in block_of(name, blocks).fields
-    }
+def check(passes: Iterable[Pass], programs: Mapping[str, Program], blocks: Blocks) -> None:
+    """Raise AssertionError where a place does not fit its program, or nothing has written what a program reads."""
+    known = {name for name, one in LISTS.items() if one.given}
     every = ((call, programs[name]) for call in calls_of(passes) for name in call.programs)
     for call, program in every:
         assert program.output is not None
         assert len(call.reads) == len(program.inputs), call
-        assert not isinstance(call.by, Solve) or "tangents" in call.by.forms or not program.tangents, call
-        needed = set() if isinstance(call.by, Solve) else _differentiated(program)
         for place, use in zip(call.reads, program.inputs, strict=True):
             assert block_of(place, blocks) == use.block, (call, place)
-            known = {field for name, field in moving if name == list_name(place)}
-            reads = {field.name for field in use.block.fields if f"{use.alias}_{field.name}" in needed}
-            lost = reads & known - use.active
-            missing = reads & use.active - known
-            assert not lost and not missing, (call, place, lost, missing)
-        written = [(list_name(place), field.name) for place in call.writes for field in block_of(place, blocks).fields]
-        assert len(written) == len(program.output.block.fields), call
-        for entry, field in zip(written, program.output.block.fields, strict=True):
-            if field.name in program.tangents:
-                moving.add(entry)
-    return {name for name, _ in moving}
+            assert list_name(place) in known, (call, place)
+        fields = [field for place in call.writes for field in block_of(place, blocks).fields]
+        assert len(fields) == len(program.output.block.fields), call
+        known |= {list_name(place) for place in call.writes}
 
 
 def block_of(place: str, blocks: Blocks) -> Block:
     """The block of a place."""
     block: Block = getattr(blocks, list_of(place).kind)
     return block
-
-
-def _differentiated(program: Program) -> set[str]:
-    """Names of the inputs on which the results of a program depend whose derivatives are emitted."""
-    targets = {s for name in program.tangents for s in program.results[name].free_symbols}
-    statements = needed_statements(program.statements, targets)
-    return {s.name for s in targets} | {s.name for st in statements for s in st.expression.free_symbols}

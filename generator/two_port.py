@@ -57,62 +57,61 @@ def _angles(p: Program, t: Symbols) -> dict[str, sp.Expr]:
 def rotation_angles(b: Blocks) -> Program:
     """psi, theta, phi (2.1) of a rotation vector, with two derivatives in time."""
     p = Program("rotation_angles", "angles psi, theta, phi (2.1) of a rotation vector, with two derivatives in time")
-    angles = _angles(p, p.read(b.turn, "t", active=False))
+    angles = _angles(p, p.read(b.turn, "t"))
     rates = {f"{name}1": p.rate(angle) for name, angle in angles.items()}
     second = {f"{name[:-1]}2": p.rate(rate) for name, rate in rates.items()}
-    p.write(b.rotation_angles, {**angles, **rates, **second}, tangents=False)
+    p.write(b.rotation_angles, {**angles, **rates, **second})
     return p
 
 
 def interface_load(b: Blocks) -> Program:
     """Force on the top plate by which springs with a moving end differ from those of the top, whose ends are fixed."""
     p = Program("interface_load", "force of the moving end of the interface, and its axial load at rest")
-    par: Symbols = p.read(b.top_parameters, "par", active=False)
-    end: Symbols = p.read(b.far_end, "e", active=False)
+    par: Symbols = p.read(b.top_parameters, "par")
+    end: Symbols = p.read(b.far_end, "e")
     x, y, z = subtract(end["u"], end["a"])
     u, v, w = end["v"]
     force = (par["k"] * x + par["c"] * u, par["k"] * y + par["c"] * v, par["kv"] * z + par["cv"] * w - end["axial"])
-    p.write(b.force, {"F": force}, tangents=False)
+    p.write(b.force, {"F": force})
     return p
 
 
 def locking_moment(b: Blocks) -> Program:
     """Moment that locks the spin of a body (docs/model.md, choice 3): end A exerts it. In the plane there is none."""
     p = Program("locking_moment", "moment that locks the spin of a body")
-    body: Symbols = p.read(b.body, "b", active=False)
-    lock: Symbols = p.read(b.lock, "l", active=False)
+    body: Symbols = p.read(b.body, "b")
+    lock: Symbols = p.read(b.lock, "l")
     planar = len(b.moment.fields) == 1
-    p.write(b.moment, {"M": ZERO if planar else scale(lock["moment"], body["t3"])}, tangents=False)
+    p.write(b.moment, {"M": ZERO if planar else scale(lock["moment"], body["t3"])})
     return p
 
 
 def lower_wrench(b: Blocks) -> Program:
     """Force and moment that end A exerts on the bearing, about its present position."""
     p = Program("lower_wrench", "wrench that the lower end exerts, about its present position")
-    frame: Symbols = p.read(b.body, "e", active=False)
-    body: Symbols = p.read(b.body, "b", active=False)
-    force: Symbols = p.read(b.force, "f", active=False)
-    moment: Symbols = p.read(b.moment, "m", active=False)
-    held: Symbols = p.read(b.moment, "h", active=False)
+    frame: Symbols = p.read(b.body, "e")
+    body: Symbols = p.read(b.body, "b")
+    force: Symbols = p.read(b.force, "f")
+    moment: Symbols = p.read(b.moment, "m")
+    held: Symbols = p.read(b.moment, "h")
     arm = p.let_vector(subtract(body["C"], frame["C"]), "arm")
     total = add(add(moment["M"], held["M"]), cross(arm, force["F"]))
-    p.write(b.end_wrench, {"F": force["F"], "M": total}, tangents=False)
+    p.write(b.end_wrench, {"F": force["F"], "M": total})
     return p
 
 
 def upper_wrench(b: Blocks) -> Program:
     """Force and moment that end B exerts on the bearing, about its present position: the interface hands them on."""
     p = Program("upper_wrench", "wrench that the upper end exerts, about its present position")
-    end: Symbols = p.read(b.far_end, "e", active=False)
-    body: Symbols = p.read(b.body, "b", active=False)
-    force: Symbols = p.read(b.force, "f", active=False)
-    moment: Symbols = p.read(b.moment, "m", active=False)
+    end: Symbols = p.read(b.far_end, "e")
+    body: Symbols = p.read(b.body, "b")
+    force: Symbols = p.read(b.force, "f")
+    moment: Symbols = p.read(b.moment, "m")
     arm = p.let_vector(subtract(body["C"], add(end["rest"], end["u"])), "arm")
     against = scale(sp.Integer(-1), force["F"])
     p.write(
         b.end_wrench,
         {"F": against, "M": subtract(cross(arm, against), moment["M"])},
-        tangents=False,
     )
     return p
 

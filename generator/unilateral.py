@@ -65,21 +65,21 @@ def _compression(p: Program, par: Symbols, slider: Symbols, x: Symbols) -> Compr
 def unilateral_depth(b: Blocks) -> Program:
     """Penetration, negative where the contact is open, and how far the damped compression misses the footprint."""
     p = Program("unilateral_depth", "unilateral contact: penetration, and by how much the footprint is missed")
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    slider: Symbols = p.read(b.body, "b", active=False)
-    x: Symbols = p.read(b.coordinates, "x", active=False)
+    par: Symbols = p.read(b.surface_parameters, "par")
+    slider: Symbols = p.read(b.body, "b")
+    x: Symbols = p.read(b.coordinates, "x")
     contact = _compression(p, par, slider, x)
     _, _, beyond = _at_edge(p, par, slider["t3"], contact.damped)
-    p.write(b.unilateral_depth, {"depth": contact.depth, "beyond": beyond}, tangents=False)
+    p.write(b.unilateral_depth, {"depth": contact.depth, "beyond": beyond})
     return p
 
 
 def _force(b: Blocks, name: str, summary: str, at_edge: bool) -> Program:
     """Force of a closed contact with its moment and energies."""
     p = Program(name, summary)
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    slider: Symbols = p.read(b.body, "b", active=("t3", "w"))
-    x: Symbols = p.read(b.coordinates, "x", active=("d", "d1"))
+    par: Symbols = p.read(b.surface_parameters, "par")
+    slider: Symbols = p.read(b.body, "b")
+    x: Symbols = p.read(b.coordinates, "x")
     contact = _compression(p, par, slider, x)
     inward = contact.damped
     if at_edge:
@@ -96,7 +96,6 @@ def _force(b: Blocks, name: str, summary: str, at_edge: bool) -> Program:
             "lost": p.let(dot(force, contact.rate)) - elastic * p.rate(contact.depth),
             "penetration": contact.depth,
         },
-        tangents=("F", "T"),
     )
     return p
 
@@ -116,9 +115,9 @@ def unilateral_edge(b: Blocks) -> Program:
 def rim_to_world(b: Blocks) -> Program:
     """Rim force along E, and the moment on the slider that its work over a separation requires (docs/uplift.md)."""
     p = Program("rim_to_world", "rim force: from the basis of the body below to E, and its moment by the separation")
-    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
-    x: Symbols = p.read(b.coordinates, "x", active=("d",))
-    rim: Symbols = p.read(b.rim, "rim", active=("f",))
+    body: Symbols = p.read(b.body, "b")
+    x: Symbols = p.read(b.coordinates, "x")
+    rim: Symbols = p.read(b.rim, "rim")
     force = p.let_vector(combine((body["t1"], body["t2"], body["t3"]), rim["f"]), "F")
     p.write(b.rim_wrench, {"F": force, "T": cross(force, x["d"])})
     return p
@@ -127,10 +126,10 @@ def rim_to_world(b: Blocks) -> Program:
 def surface_force(b: Blocks, rims: bool) -> Program:
     """Force of a surface on the body above, of its contact and its rim."""
     p = Program("surface_force", "force of a surface on the body above: of its unilateral contact and its rim")
-    contact: Symbols = p.read(b.unilateral, "c", active=("F",))
+    contact: Symbols = p.read(b.unilateral, "c")
     force = contact["F"]
     if rims:
-        rim: Symbols = p.read(b.rim_wrench, "rim", active=("F",))
+        rim: Symbols = p.read(b.rim_wrench, "rim")
         force = add(force, rim["F"])
     p.write(b.force, {"F": force})
     return p
@@ -142,12 +141,12 @@ def split_moment(b: Blocks, rims: bool) -> Program:
     They are equal but on the slider, where the moments of contact and rim by the separation are added.
     """
     p = Program("split_moment", "moments of a surface on the bodies above and below, each about its sphere centre")
-    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    par: Symbols = p.read(b.surface_parameters, "par")
     joint: Symbols = p.read(b.moment, "j")
-    contact: Symbols = p.read(b.unilateral, "c", active=("T",))
+    contact: Symbols = p.read(b.unilateral, "c")
     by_separation = contact["T"]
     if rims:
-        rim: Symbols = p.read(b.rim_wrench, "rim", active=("T",))
+        rim: Symbols = p.read(b.rim_wrench, "rim")
         by_separation = add(by_separation, rim["T"])
     by_separation = p.let_vector(by_separation, "T")
     above = p.let((1 + par["sign"]) / 2)
@@ -185,7 +184,7 @@ def contact_excess(b: Blocks) -> Program:
     An open surface has the least force along its axis, as the condensed equations have it.
     """
     p = Program("contact_excess", "contact force (3.15)-(3.17) at given psi~, theta~, N less that of its spring")
-    body: Symbols = p.read(b.body, "b", active=("t3",))
+    body: Symbols = p.read(b.body, "b")
     given: Symbols = p.read(b.force, "s")
     force: Symbols = p.read(b.force, "f")
     p.write(b.linear, {"r": subtract(subtract(given["F"], force["F"]), scale(LEAST_FORCE, body["t3"]))})

@@ -153,11 +153,14 @@ def test_planar_leaves_no_second_angle() -> None:
 
 def test_massless_leaves_no_inertia_in_the_balances() -> None:
     """Mass stays for the weight alone: no product with an acceleration, no moment of inertia."""
-    full, light = (functions(text("msfp_kernels.h", sliders=s)) for s in ("inertial", "massless"))
-    for kernel in ("msfp_linear_balance", "msfp_angular_balance"):
-        for name in (kernel, f"{kernel}_tangent"):
-            assert re.search(r"par_j[ta]|b_ac", full[name]), name
-            assert not re.search(r"par_j[ta]|b_ac|b_alp", light[name]), name
+    for file, suffix, inertia in (
+        ("msfp_kernels.h", "", r"par_j[ta]|b_ac"),
+        ("msfp_schedule.h", "_by_variables", r"par_j[ta]|d_b_ac"),
+    ):
+        full, light = (functions(text(file, sliders=s)) for s in ("inertial", "massless"))
+        for name in ("msfp_linear_balance", "msfp_angular_balance"):
+            assert re.search(inertia, full[name + suffix]), name
+            assert not re.search(r"par_j[ta]|b_ac|b_alp", light[name + suffix]), name
 
 
 def test_drilling_moment_is_there_for_the_patch_alone() -> None:

@@ -26,7 +26,7 @@ PLANAR = ModelSpec(Layout(2, 1, 0), Effects(dimension="planar"))
 SPATIAL = ModelSpec(Layout(5, 2, 2), Effects(friction="velocity"))
 KERNELS = {  # one of each kind
     "msfp_angular_balance": SPATIAL,  # values
-    "msfp_surface_local_tangent": SPATIAL,  # values and derivative columns
+    "msfp_surface_local_by_variables": SPATIAL,  # derivatives by the variables of a step
     "msfp_contact_lanes": SPATIAL,  # all surfaces at once, with a friction law
     "msfp_contact_jacobian": PLANAR,  # the same with the matrix of derivatives
     "msfp_forward": PLANAR,  # what a vertical plane leaves of the kinematics
@@ -42,7 +42,7 @@ def emitted(spec: ModelSpec, file: str) -> str:
 
 def kernel(name: str) -> str:
     """A kernel with the lines that belong to it above."""
-    text = emitted(KERNELS[name], "msfp_kernels.h")
+    text = emitted(KERNELS[name], "msfp_schedule.h" if name.endswith("_by_variables") else "msfp_kernels.h")
     match = re.search(rf"(?:^[^}}\n][^\n]*\n)*^static inline void {name}\(.*?^}}\n", text, re.MULTILINE | re.DOTALL)
     assert match is not None
     return match[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 import pytest
 
 from msfp_gen import Effects, Layout
@@ -27,9 +28,9 @@ def contact_of(**effects: object) -> Program:
 
 
 def values(program: Program, held: Mapping[str, float], **changes: float) -> dict[str, float]:
-    """The results and statements, with some statements held and others moved by a difference."""
-    known = {f"{use.alias}_{field.name}": 0.7 for use in program.inputs for field in use.block.fields} | INPUTS
-    known |= {name: value + changes.get(name, 0.0) for name, value in known.items()}
+    """The results and statements, with some inputs and statements held and others moved by a difference."""
+    known = {f"{use.alias}_{field.name}": 0.7 for use in program.inputs for field in use.block.fields} | INPUTS | held
+    known = {name: value + changes.get(name, 0.0) for name, value in known.items()}
     for statement in program.statements:
         name = statement.target.name
         value = held[name] if name in held else eval(to_python(statement.expression), in_numpy(), known)
@@ -62,3 +63,20 @@ def test_partials_of_a_law_of_friction_are_at_constant_force_and_slip(law: str) 
         assert at[f"law_{name}"] == pytest.approx(slope(program, "mu", f"g_{name}", held), abs=1e-9)
     assert at["law_mu"] == pytest.approx(slope(program, "mu", "c_mu", held), abs=1e-9)
     assert law == "plastic" or min(abs(at[f"law_{name}"]) for name in ("Y", "Z", "mu")) > 1e-6
+
+
+def test_moment_of_a_rim_with_uplift_is_the_slope_of_its_energy() -> None:
+    """The slope of angle over sine, of which the moment consists, is derived: without damping by difference quotients.
+
+    Below a concave-down surface the dish is the body above, whose rotation about the sphere centre does the work.
+    """
+    equations = derive(ModelSpec(Layout(3, 1, 1), Effects(uplift=True)))
+    program = next(program for program in equations.programs if program.name == "rim")
+    given = {"par_sign": -1.0, "par_R": 1.2, "par_sc": 0.05, "par_pr": 0.1, "par_kc": 1e7, "par_cc": 0.0}
+    given |= {"x_psi": 0.11, "x_theta": -0.23, "x_dx": 0.004, "x_dy": -0.003, "x_dz": 0.002}
+    at = values(program, given)
+    axes = {"x_psi": (1.0, 0.0, 0.0), "x_theta": (0.0, np.cos(given["x_psi"]), np.sin(given["x_psi"]))}  # (3.12)
+    lever = 1 - given["par_pr"] / given["par_R"]
+    for angle, axis in axes.items():
+        work = -given["par_kc"] * at["g"] * lever * slope(program, "g", angle, given)
+        assert np.dot([at["Mx"], at["My"], at["Mz"]], axis) == pytest.approx(work, rel=1e-6), angle

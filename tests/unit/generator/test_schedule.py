@@ -20,7 +20,6 @@ from msfp_gen.generator.schedule import (
     Call,
     Pass,
     Schedule,
-    Solve,
     calls_of,
     check,
     condensed,
@@ -88,30 +87,18 @@ def test_what_nobody_wrote_or_wrote_elsewhere_is_found() -> None:
         checked(equations_of(), changed("slip_rotation", lambda call: None))
 
 
-def test_a_derivative_that_a_program_would_lose_is_found() -> None:
-    """A program that takes for constant what moves: (3.28) with the acceleration of the body held fixed."""
-    equations = equations_of()
-    programs = {program.name: program for program in equations.programs}
-    balance = programs["linear_balance"]
-    held = [replace(use, active=frozenset()) if use.alias == "b" else use for use in balance.inputs]
-    programs["linear_balance"] = replace(balance, inputs=held)
-    with pytest.raises(AssertionError, match="linear_balance"):
-        check(passes_of(momentum_balances(Effects())), programs, equations.blocks)
-
-
-@pytest.mark.parametrize("schedule", SCHEDULES)
-@pytest.mark.parametrize("effects", EFFECTS, ids=str)
-def test_every_list_is_written_before_it_is_read(
-    effects: dict[str, object], schedule: Callable[[Effects], Schedule]
-) -> None:
-    known = {"body_parameters", "surface_parameters", "top_parameters", "frame", "x", "load_force", "load_moment"}
-    known |= {"foot_stage", "upright", "coefficient", "unknowns", "friction", "friction_previous"}
-    for call in calls_of(passes_of(schedule(Effects(**effects)))):  # type: ignore[arg-type]
-        reads = {place.partition("[")[0] for place in call.reads}
-        if isinstance(call.by, Solve):
-            reads -= {"friction_force"}  # the runtime fills it where it solves for friction
-        assert reads <= known, call
-        known |= {place.partition("[")[0] for place in call.writes}
+@pytest.mark.parametrize("effects", [*EFFECTS, {"dimension": "planar", "friction": "pvt"}], ids=str)
+def test_programs_of_a_schedule_declare_no_derivatives(effects: dict[str, object]) -> None:
+    """But for those that the runtime differentiates alone, and the columns of the fast tangent."""
+    equations = equations_of(**effects)
+    called = {
+        name
+        for schedule in SCHEDULES
+        for call in calls_of(passes_of(schedule(equations.spec.effects)))
+        for name in call.programs
+    }
+    declared = {program.name for program in equations.programs if program.tangents}
+    assert declared & called == {"contact", *(["rim"] if equations.spec.effects.rims else [])}
 
 
 @pytest.mark.parametrize(("dimension", "count"), [("spatial", 12), ("planar", 6)])
@@ -134,21 +121,45 @@ def test_arguments_that_a_driver_does_not_name_are_marked() -> None:
     """Found from the statements, and the same as a search of their text finds."""
     equations = equations_of(top_rotation=True)
     programs = {program.name: program for program in equations.programs}
-    for name, passes in {**momentum_balances(equations.spec.effects), **condensed(equations.spec.effects)}.items():
-        printed = drivers.part(name, passes, programs, {})
+    schedule = drivers.with_variables(equations.spec.effects)
+    tangents = drivers.form_of(directions.BY_VARIABLES, schedule, drivers.variable_kernels(equations))
+    for name, passes in schedule.items():
+        printed = drivers.part(name, passes, programs, [tangents])
         for form in ("values", "tangents"):
             text = " ".join(line for one in printed["passes"][form] for line in one["lines"])
             named = {*re.findall(r"\w+", text)}
             assert printed["unused"][form] == [a for a in ("p", "dp", "w", "d", "s", "ds") if a not in named], name
 
 
-@pytest.mark.parametrize("effects", [one | {"top_rotation": True, "spin": "locked"} for one in EFFECTS[3:5]], ids=str)
-def test_names_kept_by_hand_are_those_of_blocks(effects: dict[str, object]) -> None:
-    """A field that was renamed would be left out of derivatives in silence."""
-    blocks = equations_of(**effects).blocks
-    for name, quantities in directions.ENDS.items():
-        known = schedules.block_of(name, blocks) if name != "coefficient" or blocks.coefficient else blocks.contact
-        assert set(quantities) - {"past"} <= set(known.quantities), name
+@pytest.mark.parametrize("name", [name for parts in schedules.VARIABLES.values() for name, _ in parts])
+def test_variables_of_a_step_are_quantities_of_their_blocks(name: str) -> None:
+    """A quantity that was renamed would be left out of derivatives in silence."""
+    blocks = equations_of(uplift=True).blocks
+    known = set(schedules.block_of(name, blocks).quantities)
+    assert {q for parts in schedules.VARIABLES.values() for one, many in parts for q in many if one == name} <= known
+
+
+def test_what_moves_with_the_variables_of_a_step_is_found_from_the_schedule() -> None:
+    """As with the ends, but constants of a stage stay; no balance reads the axial moment where spin is locked."""
+
+    def derivatives(**effects: object) -> dict[str, Program]:
+        equations = equations_of(**effects)
+        programs = {program.name: program for program in equations.programs}
+        schedule = drivers.with_variables(equations.spec.effects)
+        return directions.directed(directions.BY_VARIABLES, schedule, programs, equations.blocks)
+
+    locked, free, massless, heated = (
+        derivatives(**one)
+        for one in ({"spin": "locked"}, {"spin": "free"}, {"sliders": "massless"}, {"friction": "pvt"})
+    )
+    assert "contact_stage" not in locked and "contact" not in locked  # constant; the runtime differentiates it
+    assert locked["angular_balance"].tangents == free["angular_balance"].tangents - {"rz"} == {"rx", "ry"}
+    assert locked["report_contact"].tangents == {"px", "py", "pz", "Mx", "My", "Mz", "dY", "dZ"}
+    assert {"acx", "acy", "acz"} == locked["forward"].tangents - massless["forward"].tangents
+    assert not {"rcx", "vcx"} & locked["forward"].tangents
+    assert heated["surface_local"].tangents == locked["surface_local"].tangents | {"tilt"}  # a source moves with it
+    top = {use.alias: use.active for use in locked["top_wrench"].inputs}
+    assert not top["par"] and not top["y"] and top["fe"] and {"Cx", "alpz"} <= top["b"]
 
 
 def test_what_moves_with_the_ends_and_is_read_is_found_from_the_schedule() -> None:
@@ -170,14 +181,14 @@ def test_what_moves_with_the_ends_and_is_read_is_found_from_the_schedule() -> No
     assert not any(use.active for use in full["top_wrench"].inputs if use.block.name.endswith("_parameters"))
 
 
-@pytest.mark.parametrize(("uplift", "counts"), [(False, (1166, 1462)), (True, (1930, 2569))])
+@pytest.mark.parametrize(("uplift", "counts"), [(False, (1184, 1462)), (True, (1948, 2569))])
 def test_operations_of_a_direction_are_those_of_the_page(uplift: bool, counts: tuple[int, int]) -> None:
     """Why the ends of a two-port have kernels of their own (docs/architecture.md)."""
     equations = equations_of(top_rotation=True, uplift=uplift)
     programs = {program.name: program for program in equations.programs}
     found = []
-    for moves in (directions.ENDS, None):
-        along = replace(directions.BY_ENDS, moves=moves)
+    for parameters in (False, True):
+        along = replace(directions.BY_ENDS, parameters=parameters)
         kernels = directions.directed(along, condensed(equations.spec.effects), programs, equations.blocks)
         found.append(sum(lower(kernel).tangent_operations for kernel in kernels.values()))
     assert tuple(found) == counts

@@ -1,5 +1,5 @@
 MSFP_INLINED
-static inline void msfp_surface_local_tangent(const double *restrict b, const double *restrict a, const double *restrict x, const double *restrict y, const double *restrict tot, const double *restrict rim, double *restrict out, const double *restrict db, const double *restrict da, const double *restrict dx, const double *restrict dy, const double *restrict dtot, const double *restrict drim, double *restrict dout)
+static inline void msfp_surface_local_by_variables(const double *restrict b, const double *restrict a, const double *restrict x, const double *restrict y, const double *restrict tot, const double *restrict rim, const double *restrict db, const double *restrict da, const double *restrict dx, const double *restrict dy, const double *restrict dtot, const double *restrict drim, double *restrict dout)
 {
     const double b_t1x = b[0];
     const double b_t1y = b[1];
@@ -14,30 +14,15 @@ static inline void msfp_surface_local_tangent(const double *restrict b, const do
     const double a_cp = a[40];
     const double a_st = a[41];
     const double a_ct = a[42];
-    const double x_psi1 = x[3];
     const double x_theta1 = x[4];
     const double x_phi1 = x[5];
-    const double y_phi1 = y[5];
+    (void)y;
     const double tot_Fx = tot[0];
     const double tot_Fy = tot[1];
     const double tot_Fz = tot[2];
-    const double rim_fx = rim[0];
-    const double rim_fy = rim[1];
-    const double rim_fz = rim[2];
+    (void)rim;
     const double s_1 = -a_ct*a_sp;
     const double s_2 = a_cp*a_ct;
-    const double out_3 = b_t1x*tot_Fx + b_t1y*tot_Fy + b_t1z*tot_Fz - rim_fx;
-    const double out_4 = b_t2x*tot_Fx + b_t2y*tot_Fy + b_t2z*tot_Fz - rim_fy;
-    const double out_5 = b_t3x*tot_Fx + b_t3y*tot_Fy + b_t3z*tot_Fz - rim_fz;
-    const double out_6 = a_st*x_phi1 + x_psi1;
-    const double out_7 = a_cp*x_theta1 + s_1*x_phi1;
-    const double out_8 = a_sp*x_theta1 + s_2*x_phi1 - y_phi1;
-    out[0] = out_3; /* px */
-    out[1] = out_4; /* py */
-    out[2] = out_5; /* pz */
-    out[3] = out_6; /* dwx */
-    out[4] = out_7; /* dwy */
-    out[5] = out_8; /* dwz */
     for (int c = 0; c < MSFP_DOF; ++c) {
         const double d_b_t1x = db[0 * MSFP_DOF + c];
         const double d_b_t1y = db[1 * MSFP_DOF + c];
