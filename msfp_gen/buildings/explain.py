@@ -43,14 +43,17 @@ def explain(scene: BuildingScene) -> list[Table]:
 
 
 def frame_table(scene: BuildingScene) -> Table:
-    """Mass, coordinates, nodes and frequencies of the building."""
+    """Weight, degrees of freedom, diaphragms, other nodes and frequencies of the building."""
     building, listed = scene.building, scene.building.frequencies[:LISTED]
     more = f", ... of {len(building.frequencies)}" if len(building.frequencies) > LISTED else ""
+    listed_nodes: dict[str, list[str]] = {"diaphragms": [], "nodes": []}
+    for node in building.nodes:
+        listed_nodes["diaphragms" if node.floor else "nodes"].append(f"{node.name} ({vector(node.position)} m)")
     rows = [
         ("weight", f"{scene.weight * 1e-6:.5g} MN at g = {scene.gravity:g} m/s^2"),
-        ("coordinates", str(len(building.mass))),
-        ("nodes", ", ".join(f"{node.name} ({vector(node.position)} m)" for node in building.nodes)),
-        ("frequencies on fixed attachments", f"{vector(listed)}{more} Hz" if len(listed) else "none: a rigid body"),
+        ("degrees of freedom", str(len(building.mass))),
+        *((name, ", ".join(places)) for name, places in listed_nodes.items() if places),
+        ("frequencies on a fixed base", f"{vector(listed)}{more} Hz" if len(listed) else "none: a rigid body"),
     ]
     return Table("building", (), rows)
 
@@ -71,7 +74,8 @@ def bearing_table(scene: BuildingScene) -> Table:
         )
         for index, (mount, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True))
     ]
-    columns = ("no.", "name", "layout", "kind", "node", "x [m]", "y [m]", "N at rest [kN]")
+    carries = "diaphragm" if all(scene.building.node(mount.node).floor for mount in scene.bearings) else "node"
+    columns = ("no.", "name", "layout", "type", carries, "x [m]", "y [m]", "N at rest [kN]")
     return Table(f"{len(rows)} bearings", columns, rows)
 
 
@@ -107,14 +111,14 @@ def _kinds(scene: BuildingScene) -> Iterator[Table]:
         bearing, where = scene.bearings[members[0]].bearing, _numbers(members, len(scene.bearings))
         doubts = doubt_tables(doubtful_values(bearing, float(max(scene.axial_loads[index] for index in members))))
         for table in (surface_table(bearing), *doubts, body_table(bearing)):
-            yield Table(f"kind {number}, {where}: {table.title}", table.columns, table.rows)
+            yield Table(f"isolator type {number}, {where}: {table.title}", table.columns, table.rows)
 
 
 def _interfaces(scene: BuildingScene) -> Iterator[Table]:
     """The different interfaces, each with the numbers of its bearings."""
     for members in grouped(mount.interface for mount in scene.bearings):
         where = _numbers(members, len(scene.bearings))
-        yield top_table(scene.bearings[members[0]].interface, f"interface to the building, {where}")
+        yield top_table(scene.bearings[members[0]].interface, f"joint to the building, {where}")
 
 
 def _doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:

@@ -134,7 +134,7 @@ def _numbers(surfaces: Sequence[int]) -> str:
 
 def _energy(energy: Mapping[str, float]) -> str:
     return (
-        f"bearings dissipate {1e-3 * energy['dissipated']:.4g} kJ, interfaces "
+        f"bearings dissipate {1e-3 * energy['dissipated']:.4g} kJ, joints "
         f"{1e-3 * energy['interface_dissipated']:.4g} kJ, the frame {1e-3 * energy['damped']:.4g} kJ; balance of the "
         f"frame closes to {energy['closure_error']:.2g}"
     )

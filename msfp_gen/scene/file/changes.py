@@ -18,6 +18,7 @@ from msfp_gen.scene.system import kinds
 Table = dict[str, Any]
 Key = str | int | None  # of a table, of a list, of all rows of a list
 _STEP = re.compile(r"([^\[\].]+)((?:\[(?:\d+|\*)\])*)")
+_WITH_UNIT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([A-Za-z%°µ].*)")  # "75 mm"
 NO_TABLES: Mapping[str, Any] = MappingProxyType({})
 ROWS = {"surfaces": Surface, "bodies": Body}
 _COLUMNS = {  # a field of surfaces or bodies -> their list, and whether one value is a list of numbers
@@ -168,9 +169,11 @@ def _own_bearing(walk: _Walk, bearing: Any, following: Key) -> Any:
 
 
 def _times(value: Any, factor: float) -> Any:
-    """A number, or each of a list, times a factor."""
+    """A number, one with its unit, or each of a list, times a factor."""
     if isinstance(value, list):
         return [_times(item, factor) for item in value]
+    if isinstance(value, str) and (match := _WITH_UNIT.fullmatch(value.strip())):
+        return f"{float(match[1]) * factor!r} {match[2]}"
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"{value!r} is no number to multiply; set it, or give a number of bearing, top or solver")
     return value * factor

@@ -30,6 +30,7 @@ from msfp_gen import (
 )
 from msfp_gen.buildings.file import building_from_table, with_single_bearings
 from msfp_gen.scene.file.source import load_bearing_scene, with_absolute_paths
+from msfp_gen.studies import load_study
 
 TEXT = """
 name = "one storey"
@@ -348,3 +349,15 @@ def test_files_of_a_table_are_found_wherever_they_are_named(tmp_path: Path):
     assert [found["building"][name] for name in ("mass", "stiffness")] == [str(tmp_path / f"{x}.mtx") for x in "MK"]
     assert found["building"]["bearing"][0]["motion"]["file"] == str(tmp_path / "corner.csv")
     assert rows[0]["motion"]["file"] == "corner.csv"  # the table itself stays
+
+
+def test_the_spacing_of_a_grid_is_an_axis_of_a_study(tmp_path: Path):
+    """Positions of all its bearings are multiplied, along both axes or along one."""
+    path = written(tmp_path, HEAD + GRID + TAIL)
+    before = np.array([each.position for each in load_scene(path).bearings])
+    for field, factors in (("position", (1.2, 1.2)), ("position[0]", (1.2, 1.0))):
+        axis = {"multiplies": f"building.bearing[*].{field}", "values": [1.0, 1.2]}
+        study = load_study({"scene": str(path), "keep": ["peak_displacement"], "axes": {"spacing": axis}})
+        first, second = (np.array([each.position for each in study.scene(run).bearings]) for run in (1, 2))
+        np.testing.assert_array_equal(first, before)
+        np.testing.assert_allclose(second, before * factors, rtol=1e-12)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from support import preset_run
+from support import ROOT, preset_run
 from support.buildings import MOTION, PLACES, pushed, pushed_scene
 from support.synthetic import loops as loops_of_one
 from support.synthetic import opened
 
 from msfp_gen import Effects, InputError, Result, RunError, Solver, changed_scene, characterise, simulate
+from msfp_gen.buildings.explain import explain
 from msfp_gen.buildings.notes import shared
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import figures_of
@@ -406,3 +408,18 @@ def test_bounds_name_the_bearing_and_surface_with_the_least_capacity_left():
     rows = {row[0]: row[1:] for row in _quantity_table(bounds).rows}
     assert rows["capacity left is of"] == (place, place, place, "")
     assert bounds.as_dict()["places"] == {"capacity_left": dict.fromkeys(CASES, place)}
+
+
+def test_words_of_the_field_come_first():
+    """In what is printed of a building; the words of its matrices are in the glossary, each beside its own."""
+    scene, result = pushed_scene(), pushed()
+    text = "\n".join(table.text for table in [*explain(scene), *result.tables()])
+    words = {
+        "diaphragm": "node", "joint to the building": "interface", "degrees of freedom": "coordinates",
+        "on a fixed base": "attachments", "isolator type 1": "kind", "base shear": "base_reaction",
+    }  # fmt: skip
+    for first, other in words.items():
+        assert first in text and not re.search(rf"\b{other}s?\b", text), (first, other)
+    glossary = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    for word in ("isolator", "joint", "diaphragm", "degree of freedom", "base shear"):
+        assert f"| {word} | `" in glossary

@@ -260,7 +260,6 @@ def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.Cap
         (["animate", "-o", "x.gif", "--end", "9"], "time = 9 s: the run holds 0 to 0.24 s"),
         (["fit", "test.csv", "--parameters", "bearing.friction"], "give a scene of one bearing here"),
         (["plot", "--figure", "loops"], "--figure = 'loops': give one of overview, plan"),
-        (["export", "-o", "x.csv", "--sign", "top-base"], "the columns of this run have one sign"),
     ],
 )
 def test_what_a_building_has_not_is_said_in_one_line(path, arguments, words, capsys, tmp_path, monkeypatch):
