@@ -284,13 +284,11 @@ def run_scene(scene: Any, force: bool = False, **options: Any) -> tuple[Any, Run
     force: as of `plausibility.require_meant`.
     """
     from msfp_gen.scene.plausibility import require_meant
-    from msfp_gen.scene.scene import Scene
     from msfp_gen.simulation.memory import require_memory
     from msfp_gen.simulation.simulate import simulate
 
     require_meant(scene, force=force)
-    if isinstance(scene, Scene):
-        require_memory([scene])
+    require_memory([scene])
     build(scene)
     with Progress(scene.name or "run") as progress:
         try:

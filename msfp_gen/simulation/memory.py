@@ -16,6 +16,7 @@ from pathlib import Path
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.history import ENERGY, LABELS, STACK, quantities
 from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.system import System
 
 VARIABLE = "MSFP_GEN_MEMORY"  # environment variable: memory that this process may use [GB]
 COPIES = 4  # of all rows at the end of a run, at most: in C, as arrays, joined over segments, and for a file
@@ -24,12 +25,14 @@ GB = 1e9
 _PROC, _CGROUP = Path("/proc"), Path("/sys/fs/cgroup")
 
 
-def require_memory(scenes: Sequence[Scene]) -> None:
-    """Raise InputError where the rows of all scenes, which are kept until the end, do not fit into memory.
+def require_memory(systems: Sequence[System]) -> None:
+    """Raise InputError where the rows of all runs, which are kept until the end, do not fit into memory.
 
-    Scenes without `output_step` count with their longest step, which gives the least number of rows. Without that they
-    are not counted: their steps are not known before.
+    Rows of one bearing alone are counted; those of other systems are few. Scenes without `output_step` count with their
+    longest step, which gives the least number of rows; without that they are not counted, since their steps are not
+    known before.
     """
+    scenes = [system for system in systems if isinstance(system, Scene)]
     counted = [scene for scene in scenes if _row_step(scene) < math.inf]
     needed = sum(map(_needed, counted))
     _of_variable()  # a wrong one is refused, however few rows there are

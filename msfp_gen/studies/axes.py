@@ -27,7 +27,7 @@ from msfp_gen.scene.file.source import located_value, scene_of
 from msfp_gen.scene.scene_fields import SceneFields
 from msfp_gen.scene.system import System
 from msfp_gen.studies.bounding.factors import FactorTable
-from msfp_gen.studies.bounding.runs import scene_of_case
+from msfp_gen.studies.bounding.runs import bounded_scenes
 
 WITHIN = (2.0**-53, 1 - 2.0**-53)  # least and largest probability at which every distribution has a finite value
 MOST = 10_000_000  # samples; each takes 8 bytes for each random axis, in the process that starts the study
@@ -441,7 +441,7 @@ class SceneFactory:
         scene = scene_of({key: value for key, value in other.items() if key != "fidelity"}, parts=self._parts)
         for axis, value in pairs:
             if axis.change == "factors":
-                scene = scene_of_case(scene, self.inputs.factors[axis.paths[0]], value)
+                scene = bounded_scenes(scene, self.inputs.factors[axis.paths[0]])[value]
         self._check_motions(scene)
         reduced: System = at_fidelity(scene, level)
         return reduced

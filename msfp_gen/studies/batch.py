@@ -9,11 +9,9 @@ from typing import Any
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.model.model import build_model, working_time
-from msfp_gen.scene.effect_switching import check
-from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import System, is_system
 from msfp_gen.simulation.memory import require_memory
-from msfp_gen.simulation.simulate import integrate
+from msfp_gen.simulation.simulate import check_method, integrate
 from msfp_gen.studies.workers import SharedProgress, local_pool, proceed, worker_count
 
 Proceed = Callable[[float, float], None]  # (simulated time, end), or (share done, 1)
@@ -53,7 +51,7 @@ def simulate_batch(
         if not is_system(scene):
             raise InputError(f"{label}: a {type(scene).__name__} is no scene; give what load_scene returns")
     runs = completed_runs(scenes, workers, strict=strict, labels=labels)
-    require_memory([scene for scene in scenes if isinstance(scene, Scene)])
+    require_memory(scenes)
     results: dict[int, Any] = {}
     with closing(runs):
         for index, result in runs:
@@ -101,12 +99,6 @@ def completed_runs(
             yield from pool.results(_run, calls, report)
 
     return results()
-
-
-def check_method(scene: System) -> None:
-    """Raise InputError where the method does not run a scene; a building needs no check."""
-    if isinstance(scene, Scene):
-        check(scene, scene.modelled)
 
 
 def build_models(scenes: Iterable[System]) -> None:

@@ -29,6 +29,7 @@ from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.scene.file.loader import Suite, load_suite, scene_table, suite_from_table, toml_file
 from msfp_gen.scene.file.source import with_absolute_paths
 from msfp_gen.scene.system import System
+from msfp_gen.simulation.simulate import check_method
 from msfp_gen.studies.axes import (
     INTENSITY,
     Axis,
@@ -40,7 +41,6 @@ from msfp_gen.studies.axes import (
     grid,
     motion_of,
 )
-from msfp_gen.studies.batch import check_method
 from msfp_gen.studies.bounding.factors import load_factors
 from msfp_gen.studies.columns import Keep, usual_names
 

@@ -32,13 +32,13 @@ from msfp_gen.common.version import __version__
 from msfp_gen.jit.cache import digest_sources
 from msfp_gen.scene.file.loader import dumps, toml_file
 from msfp_gen.scene.plausibility import require_meant
+from msfp_gen.simulation.simulate import check_method
 from msfp_gen.studies.axes import INTENSITY, SceneFactory, StudyInputs
 from msfp_gen.studies.batch import (
     BAD_INPUT,
     ENDED,
     OUT_OF_TIME,
     build_models,
-    check_method,
     run_to_end,
 )
 from msfp_gen.studies.columns import Column, Keep

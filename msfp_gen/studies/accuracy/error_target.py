@@ -224,7 +224,7 @@ def simulate_within(
         index = search.loosest()
     index = search.cheapest(index)
     result = simulate(replace(scene, solver=search.solver(index)), progress=progress)
-    if isinstance(scene, Scene):  # the estimate of that note is the coarser one
+    if any(note.kind == "vibration" for note in result.notes):  # its estimate is the coarser one
         result = replace(result, notes=tuple(note for note in result.notes if note.kind != "vibration"))
     chosen = replace(search.attempt(index), seconds=result.work["wall_time"])
     seconds_per_iteration = chosen.seconds / max(chosen.newton, 1)  # runs of the search write more rows than this one

@@ -37,7 +37,6 @@ from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.fidelity import check_stack
 from msfp_gen.scene.friction_parameters import proportional
 from msfp_gen.scene.plausibility import require_meant
-from msfp_gen.scene.scene import Scene
 from msfp_gen.specification.friction_laws import Law
 from msfp_gen.studies.batch import ENDED, completed_runs
 from msfp_gen.studies.bounding.factors import PROPERTIES, RULES, SHEET, FactorTable, load_factors
@@ -235,11 +234,6 @@ def bounded_scenes(scene: System, table: FactorTable) -> dict[str, System]:
     """
     scenes = {case: bounded_scene(scene, table, case) for case in CASES}
     return {case: bounded.beginning_like(list(scenes.values())) for case, bounded in scenes.items()}
-
-
-def scene_of_case(scene: System, table: FactorTable, case: str) -> System:
-    """The scene of one case as in `bounded_scenes`; the cases of one bearing need not be compared for it."""
-    return bounded_scene(scene, table, case) if isinstance(scene, Scene) else bounded_scenes(scene, table)[case]
 
 
 def bounded_scene(scene: System, table: FactorTable, case: str) -> System:
