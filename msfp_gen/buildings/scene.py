@@ -307,6 +307,12 @@ class BuildingScene(Printed, OtherSystem):
         return tuple(mount.bearing for mount in self.bearings)
 
     @property
+    def own_motions(self) -> tuple[str, ...]:
+        """Paths of the motions that bearings have beside that of the ground."""
+        own = (index for index, mount in enumerate(self.bearings) if mount.motion is not None)
+        return tuple(f"building.bearing[{index}].motion" for index in own)
+
+    @property
     def specs(self) -> tuple[ModelSpec, ...]:
         """Layouts and effects of the models of the bearings, each once."""
         pairs = zip(self.bearings, self.modelled, strict=True)
@@ -342,7 +348,7 @@ class BuildingScene(Printed, OtherSystem):
         """What a report shows of the superstructure, as of `report.analysis.structure_of`."""
         from msfp_gen.buildings.modes import structure
 
-        return structure(self, given)
+        return structure(self, given.get("building", {}))
 
     def quantities(self) -> dict[str, Source]:
         """What tables report of a run, as of `results.quantities.quantities`."""

@@ -12,6 +12,7 @@ from msfp_gen.cli.console import (
     Force,
     Progress,
     SignOption,
+    is_result,
     load_source,
     note,
     note_exceeded,
@@ -158,6 +159,8 @@ def _check_figure_output(figure: str, output: Path) -> None:
 
 def _targets(figure: str, output: Path, known: Collection[str]) -> dict[str, Path]:
     """Name -> file of each figure, of those that this scene or result has. Raises InputError for an unknown name."""
+    if not known:
+        raise InputError(f"--figure = {figure!r}: this system has no figures; its rows are in `msfp-gen export`")
     if figure not in (*known, EVERY):
         raise InputError(f"--figure = {figure!r}: give one of {', '.join((*known, EVERY))} here")
     if figure != EVERY and output.suffix:
@@ -173,12 +176,11 @@ def _reject_unused(targets: dict[str, Path], options: dict[str, float | None], u
 
 
 def _load_for_figures(source: str) -> AnyResult | System:
-    """A saved result, or a scene of one bearing with rows for smooth figures, or another system."""
+    """A saved result, or a system with rows for smooth figures."""
     from msfp_gen.figures import with_smooth_rows
-    from msfp_gen.scene.scene import Scene
 
     loaded = load_source(source)
-    return with_smooth_rows(loaded) if isinstance(loaded, Scene) else loaded
+    return loaded if is_result(loaded) else with_smooth_rows(loaded)
 
 
 MOST = 5000  # instants in the interactive view; more would give a file of tens of megabytes

@@ -144,13 +144,13 @@ class ErrorTarget:
 
         others: values of the options that cannot be combined with --error.
         """
-        from msfp_gen.studies.accuracy.error_target import BUDGET, check_target
-
         if error is None:
             for name, present in (("--explain", explain), ("--budget", budget is not None)):
                 if present:
                     raise InputError(f"{name} belongs to --error: give both, such as --error 0.5%")
             return None
+        from msfp_gen.studies.accuracy.error_target import BUDGET, check_target
+
         for name, value in others.items():
             if value is not None:
                 raise InputError(f"--error = {error:g}: cannot be combined with {name}; give one of them")
@@ -255,6 +255,9 @@ def demo(
 def _with_options(scene: System, duration: float | None, **solver: Any) -> System:
     """`scene` with the duration and solver options of the command line."""
     changes = {name: value for name, value in solver.items() if value is not None}
+    for name, given in (("solver", changes), ("duration", duration is not None)):
+        if given and name not in scene.__dataclass_fields__:
+            raise InputError(f"{scene.name}: this system has no field {name}; leave out the options that change it")
     scene = replace(scene, solver=replace(scene.solver, **changes)) if changes else scene
     return scene if duration is None else replace(scene, duration=duration)
 

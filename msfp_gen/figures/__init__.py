@@ -89,8 +89,11 @@ def _figures_of_scene(_: Scene) -> Mapping[str, Callable[[Any, str | Path | None
     return FIGURES
 
 
-def with_smooth_rows(scene: Scene) -> Scene:
-    """The scene with ROWS rows, no further apart than the samples of a record, unless it has its own output step."""
-    if scene.output_step is not None:
+def with_smooth_rows(scene: Any) -> Any:
+    """The system with ROWS rows, no further apart than the samples of a record, unless it has its own output step.
+
+    A system whose steps end at its rows stays as it is.
+    """
+    if not scene.rows_between_steps or scene.output_step is not None:
         return scene
     return replace(scene, output_step=min(scene.end / ROWS, scene.motion.max_step or scene.end))

@@ -60,7 +60,7 @@ class Section:
 
 @singledispatch
 def structure_of(scene: Any, given: Mapping[str, Any]) -> tuple[list[Table], list[Captioned]]:
-    """Tables and figures of the superstructure of a system. given: its table in the file."""
+    """Tables and figures of the superstructure of a system. given: the table of its file."""
     found: tuple[list[Table], list[Captioned]] = scene.structure(given)
     return found
 
@@ -160,7 +160,7 @@ def _sections(study: Study, bounds: SuiteBounds, rows: Any, scene: Any) -> Itera
         "Envelope over records and bounds", (), [first, *others, limit_table(bounds, rows)], [(caption, figure)]
     )
     yield _bearing_section(study, scene)
-    tables, figures = structure_of(scene, study.table["scene"].get("building", {}))
+    tables, figures = structure_of(scene, study.table["scene"])
     yield Section("Superstructure", (), tables, figures)
     yield _motion_section(study, bounds)
     yield _part_section(bounds, "Floor accelerations, drifts and storey shears", FLOORS)
@@ -195,7 +195,7 @@ def _last_sections(study: Study, bounds: SuiteBounds, rows: Any, scene: Any) -> 
         "These comparisons are of the program, in its tests, and none is of this structure. Each page of the "
         "documentation says what was compared, and how large the differences were."
     )
-    kinds = {"building"} if "building" in study.table["scene"] else set()
+    kinds = set(study.table["scene"])  # names of its tables, such as "building"
     if any("sheet" in given for _, given in _bearings(study.table["scene"])):
         kinds.add("sheet")
     yield Section("Which parts of the program were compared with what", (words,), [compared_table(kinds)])

@@ -94,7 +94,7 @@ def summary_page(result: AnyResult) -> list[Table]:
     """Tables of the run as in `msfp-gen run`, without times of the machine, and of the events of one bearing."""
     first, *others = result.tables()
     rows = [("time simulated", f"{result.summary['duration']:.6g} s"), *(row for row in first.rows if row[0] != "time")]
-    events = result.events if isinstance(result, Result) else ()
+    events = getattr(result, "events", ())  # a building has those of its bearings in the notes
     return [Table("the run", (), rows), *others, *([_event_table(events)] if events else [])]
 
 

@@ -7,6 +7,7 @@ is off by a thousand, is refused by the command line unless it is told to run (`
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import singledispatch
 from itertools import pairwise
 from math import inf, pi
 from typing import Any, NamedTuple
@@ -338,10 +339,14 @@ def shear_doubts(force: float, load: float, name: str, of_load: str) -> Iterator
         yield 0, force, text
 
 
+@singledispatch
 def refusals(system: Any) -> list[str]:
     """The texts of the doubts about values that no unit can make right, each once."""
-    if not isinstance(system, Scene):
-        return list(dict.fromkeys(system.refusals()))
+    return list(dict.fromkeys(system.refusals()))
+
+
+@refusals.register(Scene)
+def _refusals_of_bearing(system: Scene) -> list[str]:
     return [text for (_, _, text), refused in judged((*OF_BEARING, *OF_RUN), subject_of(system)) if refused]
 
 

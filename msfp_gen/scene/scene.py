@@ -51,6 +51,8 @@ class Scene(Printed, SceneFields):
     """
 
     run_options: ClassVar[frozenset[str]] = frozenset({"strict", "gradients", "energy_gradients", "gradient_errors"})
+    rows_between_steps: ClassVar[bool] = True
+    own_motions: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         for name, kind in _PART_TYPES.items():
@@ -136,6 +138,15 @@ class Scene(Printed, SceneFields):
     def with_all_effects(self) -> Self:
         """The scene with every effect that it has parameters for and does not fix; itself where effects are given."""
         return self if isinstance(self.effects, Effects) else replace(self, effects=all_effects(self))
+
+    def with_effects_for(self, error: float) -> tuple[Self, str]:
+        """The scene with effects selected for half of an error [-], and why; the other half is for the method."""
+        effects = self.effects
+        if isinstance(effects, Effects):
+            return self, f"effects as the scene has them: {effects.dimension}, {effects.sliders} sliders"
+        scene = replace(self, effects=replace(effects, error=min(effects.error, error / 2)))
+        reasons = scene.effect_selection.reasons
+        return scene, "; ".join(f"{reason.effect} = {reason.chosen}: {reason.because}" for reason in reasons)
 
     @property
     def loads_at_rest(self) -> tuple[float, ...]:

@@ -81,6 +81,17 @@ class System(Protocol):
     def with_all_effects(self) -> Self:
         """It with every effect that it has parameters for and does not fix."""
 
+    def with_effects_for(self, error: float) -> tuple[Self, str]:
+        """It with effects for a run with a relative error [-], and the reasons as text; given effects are kept."""
+
+    @property
+    def rows_between_steps(self) -> bool:
+        """Whether rows at even times are interpolated, so that `output_step` leaves the steps as they are."""
+
+    @property
+    def own_motions(self) -> tuple[str, ...]:
+        """Paths of the motions of single bearings, which `motion` does not move."""
+
     @property
     def loads_at_rest(self) -> tuple[float, ...]:
         """Axial load of every bearing at rest [N]."""
@@ -95,10 +106,24 @@ class System(Protocol):
 class OtherSystem(ABC):
     """Base of systems that are no `Scene`: what the functions of the core ask of them. A subclass has `start`.
 
+    It is a frozen dataclass with the fields or properties name, motion, end, limits, fidelity, every_bearing and specs
+    of `System`; with a field solver its errors can be measured, with a field duration the run can be made shorter.
+
     run_options: names of the options of `simulate` that a run has, beside progress and checkpoints.
     """
 
     run_options: ClassVar[frozenset[str]] = frozenset()
+    rows_between_steps: ClassVar[bool] = False
+    own_motions: Any = ()  # a property of buildings
+    name: Any
+
+    def text(self) -> str:
+        """It as the text of a scene file, for files of results and checkpoints. Raises InputError: it has none."""
+        raise InputError(f"{self.name}: this system cannot be written as a scene file; leave the file out")
+
+    def structure(self, given: Mapping[str, Any]) -> Any:
+        """Tables and figures of the superstructure, as of `report.analysis.structure_of`. given: the scene's table."""
+        return [], []
 
     @abstractmethod
     def start(self, **options: Any) -> Any:
@@ -145,6 +170,10 @@ class OtherSystem(ABC):
     def with_all_effects(self) -> Any:
         """It with every effect that it has parameters for and does not fix."""
         return self
+
+    def with_effects_for(self, error: float) -> tuple[Any, str]:
+        """It with effects for a run with a relative error [-], and the reasons as text."""
+        return self, "effects as they are selected for every bearing"
 
     @property
     def loads_at_rest(self) -> tuple[float, ...]:

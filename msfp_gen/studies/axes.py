@@ -447,17 +447,16 @@ class SceneFactory:
         return reduced
 
     def _check_motions(self, scene: System) -> None:
-        """Raise InputError where bearings of a building have motions of their own, which the study does not change."""
-        mounts = getattr(scene, "bearings", ())
-        own = [index for index, mount in enumerate(mounts) if mount.motion is not None]
+        """Raise InputError where bearings have motions of their own, which the study does not change."""
+        own = scene.own_motions
         if own and self.inputs.records:
             what = "records and their scales give the motion of the scene"
-        elif own and len(own) == len(mounts) and "motion" in self._changed:
+        elif own and len(own) == len(scene.every_bearing) and "motion" in self._changed:
             what = "no bearing is left on the motion of the scene, which the study changes"
         else:
             return
         raise InputError(
-            f"building.bearing[{own[0]}].motion: this bearing has a motion of its own, and {what}; leave the motions "
+            f"{own[0]}: this bearing has a motion of its own, and {what}; leave the motions "
             "of bearings out, or vary them by their paths"
         )
 

@@ -26,6 +26,30 @@ ORDER = (
     "studies", "report", "auditing", "buildings", "", "cli", "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
 
+# The guests of the core, and the guests that each of them imports; all import the core.
+GUESTS = {
+    "embedding": set(),
+    "design": set(),
+    "figures": {"design"},
+    "studies": {"figures"},
+    "report": {"figures", "studies", "design"},
+    "auditing": {"figures", "report"},
+    "buildings": {"figures", "report", "embedding"},
+    "cli": {"auditing", "design", "embedding", "figures", "report", "studies"},
+}
+
+# Functions outside `buildings` that ask whether they have the scene or the result of one bearing, each with its reason.
+KIND_SWITCHES = {
+    "scene.file.source.load_bearing_scene": "states that a scene of one bearing is wanted",
+    "simulation.memory.require_memory": "rows of other systems are few",
+    "simulation.simulate.check_method": "other systems check their method at their start",
+    "studies.accuracy.timed_run.require_base_motion_only": "states that a method runs one bearing alone",
+    "studies.accuracy.methods._with_effects": "one planar model for each axis combines histories of one bearing",
+    "auditing.stated.stated_of": "states that a check is of one bearing",
+    "cli.model_commands._export_rows": "only rows of one bearing have the option --sign",
+}
+KINDS_OF_SYSTEMS = {"Scene", "BuildingScene", "Result", "BuildingResult"}
+
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 BROUGHT = {"markupsafe": "jinja2", "PIL": "matplotlib"}  # what a dependency requires itself
 DEPENDENCIES, EXTRAS = PROJECT["dependencies"], PROJECT["optional-dependencies"]
@@ -102,7 +126,7 @@ def test_packages_import_downward():
         f"{name} imports {other}"
         for name, path in MODULES.items()
         for other in sorted(ours(path, late=True))
-        if place(other) > place(name) and (name.split(".")[1], other.split(".")[1]) != ("studies", "buildings")
+        if place(other) > place(name)
     ]
     assert not back, back
 
@@ -123,14 +147,58 @@ def test_the_core_imports_no_satellite():
             assert "import_module" not in ast.dump(tree_of(path)), f"{name} imports a module that a text names"
 
 
-def test_a_run_loads_the_core_alone():
-    """The model is in the cache: its build loads SymPy and Cython."""
+def test_guests_import_the_core_and_the_guests_that_are_listed():
+    for package, others in GUESTS.items():
+        files = [path for name, path in MODULES.items() if name.split(".")[1:2] == [package]]
+        found = {other.split(".")[1] for path in files for other in ours(path, late=True) if other.count(".")}
+        assert found - set(CORE) - {package} == others, package
+
+
+def test_the_diagram_of_the_packages_has_their_imports():
+    """Every arrow is an import of at least one module, and every import between guests is an arrow."""
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    drawn = set()
+    for line in re.search(r"```mermaid\nflowchart TB\n(.*?)```", text, re.DOTALL)[1].splitlines():
+        if "-." not in line:
+            left, right = line.split("-->")
+            drawn |= {(left.strip(), other.split("[")[0].strip()) for other in right.split("&")}
+    arrows = {
+        (name.split(".")[1], other.split(".")[1])
+        for name, path in MODULES.items()
+        for other in ours(path, late=True)
+        if name.count(".") and other.count(".")
+    }
+    assert drawn <= arrows, drawn - arrows
+    assert {(package, other) for package, others in GUESTS.items() for other in others} <= drawn
+
+
+def test_few_functions_ask_for_the_kind_of_a_system():
+    """What a system or a result can do stands in its class, or in functions that kinds register for."""
+    found = set()
+    for name, path in MODULES.items():
+        if name.startswith("msfp_gen.buildings") or name.count(".") < 2:
+            continue
+        for function in (node for node in ast.walk(tree_of(path)) if isinstance(node, ast.FunctionDef)):
+            calls = (node for node in ast.walk(function) if isinstance(node, ast.Call) and len(node.args) == 2)
+            asked = (call.args[1] for call in calls if ast.unparse(call.func) in ("isinstance", "issubclass"))
+            names = {node.id for kind in asked for node in ast.walk(kind) if isinstance(node, ast.Name)}
+            if names & KINDS_OF_SYSTEMS:
+                found.add(f"{name.removeprefix('msfp_gen.')}.{function.name}")
+    assert found == set(KIND_SWITCHES)
+
+
+def test_a_run_loads_the_core_alone(tmp_path):
+    """The model is in the cache: its build loads SymPy and Cython. The command adds its own package."""
     msfp_gen.simulate(msfp_gen.load_scene("fenz-test2"))
-    code = "import sys, msfp_gen; msfp_gen.simulate(msfp_gen.load_scene('fenz-test2')); print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    packages = {name.split(".")[1] for name in loaded if name.startswith("msfp_gen.")}
-    assert packages <= set(CORE), packages - set(CORE)
-    assert not HEAVY & set(loaded)
+    code = "msfp_gen.simulate(msfp_gen.load_scene('fenz-test2'))"
+    command = "from msfp_gen.cli import main; sys.argv = ['msfp-gen', 'run', 'fenz-test2']; main()"
+    for work, more in ((code, set()), (command, {"cli"})):
+        script = f"import atexit, sys, msfp_gen; atexit.register(lambda: print(*sys.modules)); {work}"
+        lines = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+        loaded = lines.splitlines()[-1].split()
+        packages = {name.split(".")[1] for name in loaded if name.startswith("msfp_gen.")}
+        assert packages <= set(CORE) | more, packages - set(CORE)
+        assert not HEAVY & set(loaded)
 
 
 def test_no_modules_import_each_other_in_a_circle():

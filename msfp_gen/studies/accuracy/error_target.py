@@ -18,11 +18,9 @@ from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.tables import Table
 from msfp_gen.model.model import build_model, working_time
 from msfp_gen.scene.effect_selection import slider_period
-from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import System
 from msfp_gen.simulation.outcome import Progress
 from msfp_gen.simulation.simulate import simulate
-from msfp_gen.specification.layout import Effects
 from msfp_gen.studies.accuracy.timed_run import (
     CUT_OFF,
     Errors,
@@ -49,23 +47,6 @@ STAGNATION_RATIO = 0.7  # ratio of errors over two candidates above which the to
 BUDGET = 120.0  # wall time of the whole search [s]
 METHOD: Final = "implicit"
 REFERENCE_METHOD = "esdirk4"  # other stages, order and dense output
-
-
-def with_effects_for(system: System, error: float) -> tuple[System, str]:
-    """The system with effects for a run with relative error `error` [-], and the reasons as text.
-
-    Given effects are kept. With effect selection (`Auto`) those of one bearing are selected for half of `error`; the
-    other half is for the method. What is selected below a building does not depend on the error.
-    """
-    if not isinstance(system, Scene):
-        return system, "effects as they are selected for every bearing"
-    scene, effects = system, system.effects
-    if isinstance(effects, Effects):
-        return scene, f"effects as the scene has them: {effects.dimension}, {effects.sliders} sliders"
-    effects = replace(effects, error=min(effects.error, error / 2))
-    scene = replace(scene, effects=effects)
-    reasons = scene.effect_selection.reasons
-    return scene, "; ".join(f"{reason.effect} = {reason.chosen}: {reason.because}" for reason in reasons)
 
 
 @dataclass(frozen=True)
@@ -210,7 +191,7 @@ def simulate_within(
     check_target(error, budget)
     check_measurable(scene)
     scene = replace(scene, solver=replace(scene.solver, method=METHOD))
-    scene, effect_reasons = with_effects_for(scene, error)
+    scene, effect_reasons = scene.with_effects_for(error)
     for candidate in (scene, scene.with_all_effects()):
         for spec in candidate.specs:
             build_model(spec.layout, spec.effects)

@@ -24,7 +24,6 @@ from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.output import make_folder, write_bytes
 from msfp_gen.common.tables import Table, write_rows
 from msfp_gen.common.version import __version__
-from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import System
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.accuracy.methods import METHODS, VARIANTS, Method, methods_named
@@ -207,16 +206,15 @@ def check_settings(tolerances: Sequence[float], limit: float) -> None:
         raise InputError(f"limit = {limit:g}: give seconds above zero")
 
 
-def without_stop(system: System) -> System:
+def without_stop(system: Any) -> Any:
     """The system with a duration up to its stop condition in place of this condition, which SciPy does not have.
 
     All effects are modelled, so that no run changes its model. Uplift is modelled only where `Auto` selects it at the
     start, since most methods have no uplift: a run in which a surface opens then fails. Another system stays as it is.
     """
-    if not isinstance(system, Scene):
+    if "stop" not in system.__dataclass_fields__:
         return system
-    scene = system
-    complete = scene.with_all_effects()
+    scene, complete = system, system.with_all_effects()
     if complete is not scene:
         scene = replace(complete, effects=replace(complete.modelled, uplift=scene.modelled.uplift))
     if scene.stop is None:

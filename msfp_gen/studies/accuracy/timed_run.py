@@ -84,14 +84,26 @@ class Reference:
 
 
 def errors(trial: Trial, reference: Trial) -> Errors | None:
-    """Errors of `trial` against `reference` over the common rows; None if there are none.
+    """Errors of `trial` against `reference` at the times of the one with fewer rows; None if there are none.
 
     Raises InputError if a quantity of the reference is zero at all times, so that relative errors are undefined.
     """
-    rows = min(trial.rows, reference.rows)
-    if not rows:
+    if not min(trial.rows, reference.rows):
         return None
-    return Errors({name: _error(trial.histories.get(name), exact, rows) for name, exact in reference.histories.items()})
+    at = min(trial.instants, reference.instants, key=len)  # straight lines between many rows are short
+    at = at[at <= min(trial.instants[-1], reference.instants[-1])]
+    found, exact = (
+        {name: _at(at, one.instants, values) for name, values in one.histories.items()} for one in (trial, reference)
+    )
+    return Errors({name: _error(found.get(name), values, len(at)) for name, values in exact.items()})
+
+
+def _at(at: Array, times: Array, values: Array) -> Array:
+    """The values of all times where the others are the first of them, and else at the others, by straight lines."""
+    if np.array_equal(at, times[: len(at)]):
+        return values
+    flat = [np.interp(at, times, column) for column in values.reshape(len(times), -1).T]
+    return np.column_stack(flat).reshape(len(at), *values.shape[1:])
 
 
 def _error(found: Array | None, exact: Array, rows: int) -> Error:
@@ -161,9 +173,10 @@ class Trial:
         newton: number of Newton iterations on the equations of motion, in all loops.
         evaluations, steps: numbers of evaluations of the equations, 0 of a building, and of accepted steps.
         histories: quantity -> its values at the first K instants, shape (K, places, components) [SI]; {} for a run
-            without rows. The instants are `comparison_times(end)`; of a building the times of its rows.
+            without rows.
         message: one line about a failure.
         stepped: whether the method has no error control.
+        times: the instants [s], shape (K,); None: the first of `comparison_times(end)`.
     """
 
     method: str
@@ -178,6 +191,12 @@ class Trial:
     histories: Mapping[str, Array]
     message: str = ""
     stepped: bool = False
+    times: Array | None = None
+
+    @property
+    def instants(self) -> Array:
+        """The instants of the histories [s], shape (K,)."""
+        return comparison_times(self.end)[: self.rows] if self.times is None else self.times[: self.rows]
 
     @property
     def setting(self) -> str:
@@ -239,8 +258,7 @@ def run_native(name: str, system: System, rtol: float, limit: float, repeats: in
     """
     check_measurable(system)
     solver = replace(system.solver, method=cast("Any", name), rtol=rtol, atol_angle=None)
-    # Steps of other systems end at their rows, so that other rows would be another run.
-    rows = {"output_step": system.end / ROWS} if isinstance(system, Scene) else {}
+    rows = {"output_step": system.end / ROWS} if system.rows_between_steps else {}
     sampled = replace(system, solver=solver, **rows)
     try:
         result = run_to_end(sampled, seconds=limit)
@@ -270,6 +288,7 @@ def run_native(name: str, system: System, rtol: float, limit: float, repeats: in
         steps=int(work["steps"]),
         histories=result.compared,
         message=message,
+        times=None if rows else result.time,
     )
 
 

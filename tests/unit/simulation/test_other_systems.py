@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from msfp_gen import InputError, Motion, Scene, load_scene, simulate, simulate_batch, study
+from msfp_gen import InputError, Motion, Scene, Solver, load_scene, simulate, simulate_batch, study
+from msfp_gen.cli import main
 from msfp_gen.report import write_report
 from msfp_gen.results.quantities import quantities
 from msfp_gen.scene.explain import explain
@@ -21,6 +22,7 @@ from msfp_gen.scene.system import GROUP, Kind, OtherSystem, kinds
 from msfp_gen.simulation.bearing_run import start_bearing
 from msfp_gen.studies import read_study
 from msfp_gen.studies.accuracy import simulate_within
+from msfp_gen.studies.accuracy.timed_run import errors, run_native
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,92 @@ def test_a_third_kind_runs_through_everything(file: Path, tmp_path: Path) -> Non
     table = read_study(tmp_path / "out")
     assert table["peak_force"][0] == pytest.approx(result.summary["peak_force"]["radial"], rel=1e-12)
     assert table["peak_force"][1] < 0.6 * table["peak_force"][0]
+
+
+SOLVER = Solver()
+
+
+@dataclass(frozen=True)
+class Tunable(Pair):
+    """A pair whose method and tolerances can be chosen."""
+
+    solver: Any = SOLVER
+
+    @property
+    def half(self) -> Scene:
+        return replace(super().half, solver=self.solver)
+
+
+def test_errors_of_a_third_kind_are_those_of_its_bearing(file: Path) -> None:
+    """Its rows are the steps of each run, at other times in each: they are compared at the fewer ones."""
+    pair = load_scene(file)
+    tunable = Tunable(pair.whole, pair.motion)
+    for rtol in (1e-2, 1e-3):
+        trials, alone = (
+            [run_native("implicit", system, each, 60.0, repeats=0) for each in (rtol, 1e-7)]
+            for system in (tunable, pair.half)
+        )
+        found, want = errors(*trials), errors(*alone)
+        assert found is not None and want is not None
+        assert found.parts["force"].rms == pytest.approx(want.parts["force"].rms, rel=0.5)
+        assert found.parts["force"].peak == pytest.approx(want.parts["force"].peak, abs=2e-3)
+    within = simulate_within(tunable, 0.05)
+    assert within.estimate < 0.05 and within.result.succeeded
+
+
+@dataclass(frozen=True)
+class Bare(OtherSystem):
+    """A system with no more than it must have."""
+
+    whole: Scene
+    name: str = "bare"
+    motion = property(lambda self: self.whole.motion)
+    end = property(lambda self: self.whole.end)
+    specs = property(lambda self: self.whole.specs)
+    every_bearing = property(lambda self: self.whole.every_bearing)
+    limits = fidelity = None
+
+    def start(self, **options: Any) -> Any:
+        return start_bearing(self.whole, **options)
+
+
+BARE = Kind("pair", lambda *args: Bare(pair_from_table(*args).half), lambda _: iter(()))
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (("run", "--checkpoint", "c.ck"), "bare: this system cannot be written as a scene file; leave the file out"),
+        (("run", "--duration", "1"), "bare: this system has no field duration; leave out the options that change it"),
+        (("run", "--rtol", "1e-3"), "bare: this system has no field solver; leave out the options that change it"),
+        (("run", "--error", "5%"), "bare: errors of this system cannot be measured, since it has no field solver"),
+        (("plot", "--figure", "all", "-o", "figures"), "--figure = 'all': this system has no figures; its rows are in"),
+        (("plot", "-o", "p.png"), "--figure = 'overview': this system has no figures; its rows are in"),
+        (("bound", "-o", "b"), "this system has no bearings that can be changed"),
+    ],
+)
+def test_what_a_kind_does_not_define_is_one_line(
+    file: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    command: tuple[str, ...],
+    message: str,
+) -> None:
+    monkeypatch.setattr(sys.modules[__name__], "PAIR", BARE)
+    monkeypatch.chdir(file.parent)
+    kinds.cache_clear()
+    assert main([command[0], str(file), *command[1:]]) == 2
+    error = capsys.readouterr().err
+    assert message in error and len(error.strip().splitlines()) == 1
+    assert not [path for path in file.parent.iterdir() if path.name in ("c.ck", "figures", "p.png", "b")]
+
+
+def test_a_kind_without_more_runs_and_is_explained(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules[__name__], "PAIR", BARE)
+    kinds.cache_clear()
+    bare = load_scene(file)
+    assert np.array_equal(simulate(bare).history.top_force, simulate(bare.whole).history.top_force)
+    assert main(["explain", str(file)]) == 0
 
 
 def test_what_it_has_not_is_one_line(file: Path) -> None:

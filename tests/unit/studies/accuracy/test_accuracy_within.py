@@ -362,12 +362,12 @@ def test_reference_runs_that_fail_end_the_search(monkeypatch):
 def test_effects_that_cannot_meet_the_target_are_given_up(monkeypatch):
     """Selected effects whose reference runs differ at any tolerance are replaced by all effects."""
     scene = replace(load_scene("fenz-test5"), effects=Auto(rims=None), output_step=None)
-    real = error_target.with_effects_for
+    real = Scene.with_effects_for
 
     def without_rims(given, error):
         return replace(given, effects=replace(given.effects, rims=None)), real(given, error)[1]
 
-    monkeypatch.setattr(error_target, "with_effects_for", without_rims)
+    monkeypatch.setattr(Scene, "with_effects_for", without_rims)
     monkeypatch.setattr(Scene, "with_all_effects", full_with_other_friction)
     found = simulate_within(scene, 0.01)
     assert isinstance(found.result.scene.effects, Effects) and "they leave an error" in " ".join(found.reasons)
