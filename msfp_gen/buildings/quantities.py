@@ -12,6 +12,9 @@ _RUN = RUN | {
 }
 LEAST, MOST = "least axial force over the load at rest", "largest axial force over the load at rest"
 AT_CORNERS = "peak floor acceleration at corners"
+LEAST_LEFT = (
+    "least capacity left of a surface"  # the inner ones of a triple pendulum have little, however far it may move
+)
 QUANTITIES = _RUN | {
     "peak_base_torsion": Quantity("N m", "peak_base_torsion", extreme="most"),
     "peak_overturning_moment": Quantity("N m", "peak_overturning_moment.radial", "most"),
@@ -37,7 +40,9 @@ QUANTITIES = _RUN | {
     "bearing_uplift_duration": Quantity("s", "bearings.*.uplift.duration", "most", of_parts=True),
     "floor_spectra": Quantity("", "floor_spectra", apart=True),  # as JSON: `spectra.kept_spectra`
     "secant_period": Quantity("s", "secant_period", characterised=True),
-    "capacity_left": Quantity("m", "capacity_left", "least", characterised=True, where="capacity_left_at"),
+    "capacity_left": Quantity(
+        "m", "capacity_left", "least", words=LEAST_LEFT, characterised=True, where="capacity_left_at"
+    ),
 }
 
 

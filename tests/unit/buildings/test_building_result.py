@@ -406,7 +406,7 @@ def test_bounds_name_the_bearing_and_surface_with_the_least_capacity_left():
     assert place == f"bearing {bearing + 1}{f' {name}' if name else ''}, surface {surface + 1}: {100 * share:.3g} %"
     assert bounds.quantities()["capacity_left"]["lower"] == left.min()
     rows = {row[0]: row[1:] for row in _quantity_table(bounds).rows}
-    assert rows["capacity left is of"] == (place, place, place, "")
+    assert rows["least capacity left of a surface is of"] == (place, place, place, "")
     assert bounds.as_dict()["places"] == {"capacity_left": dict.fromkeys(CASES, place)}
 
 
