@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from msfp_gen.motions.prescribed import Load as Load
     from msfp_gen.motions.prescribed import Rotation as Rotation
     from msfp_gen.report import write_report as write_report
+    from msfp_gen.results.depth import temperature_at_depth as temperature_at_depth
     from msfp_gen.results.result import Result as Result
     from msfp_gen.results.result import characterise as characterise
     from msfp_gen.results.result import load_result as load_result
@@ -138,6 +139,7 @@ _MODULES = {
     "simulate_batch": "studies.batch",
     "study": "studies.run",
     "symbolic": "model.symbolic",
+    "temperature_at_depth": "results.depth",
     "using_sign": "results.sign",
     "write_report": "report",
 }
