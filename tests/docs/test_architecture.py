@@ -46,7 +46,6 @@ KIND_SWITCHES = {
     "studies.accuracy.timed_run.require_base_motion_only": "states that a method runs one bearing alone",
     "studies.accuracy.methods._with_effects": "one planar model for each axis combines histories of one bearing",
     "auditing.stated.stated_of": "states that a check is of one bearing",
-    "cli.model_commands._export_rows": "only rows of one bearing have the option --sign",
 }
 KINDS_OF_SYSTEMS = {"Scene", "BuildingScene", "Result", "BuildingResult"}
 
