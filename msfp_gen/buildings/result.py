@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -404,8 +404,9 @@ def bearing_result(building: BuildingResult, index: int) -> Result:
     )
     own_notes = (note for note in building.monitored if note.bearing == index + 1)
     return Result(
-        scene=cast("Any", scene),
-        history=cast("Any", history),
+        scene=scene,
+        history=history,
+        counters=None,
         status=building.status,
         message=building.message,
         provenance=building.provenance,

@@ -190,7 +190,7 @@ def draw_bars(axes: Axes, result: Result) -> None:
     """One row per surface, top surface uppermost: a bar while it slides, a black edge during rim contact, a white bar
     while it is separated. The share of time in which it slides stands to the right.
     """
-    history = result.history
+    history = result.alone.history
     slides, on_rim, apart = sliding_surfaces(history), rims_in_contact(history), history.separated
     span = float(history.time[-1] - history.time[0])
     for surface in range(1, history.surfaces + 1):
@@ -274,7 +274,7 @@ def plot_energy(result: Result, path: str | Path | None = None) -> Figure:
 
     Terms below 0.1 % of the largest input are left out.
     """
-    energy = result.history.energy
+    energy = result.alone.history.energy
     peak = max(float(np.abs(energy["input"]).max()), np.finfo(float).tiny)
     with page(11.5, 5.6, path) as figure:
         headline(figure, label_of(result))
@@ -333,7 +333,7 @@ def plot_force_path(result: Result, path: str | Path | None = None, *, time: flo
         time: instant of the lines of force [s]; None: at the largest displacement.
 
     Raises:
-        InputError: a time outside the run, or a path that cannot be written.
+        InputError: a time outside the run, a bearing of a building, or a path that cannot be written.
     """
     then = at_times(result, peak_time(result) if time is None else time)
     (section,) = sections(then)
@@ -349,15 +349,14 @@ def plot_force_path(result: Result, path: str | Path | None = None, *, time: flo
 
 def eccentricity(result: Result) -> Array:
     """Distance of every contact from the axis of its slider [m], shape (T, n-1); NaN while the surface is separated."""
-    history = result.history
-    return np.where(
-        history.separated, np.nan, contact_offsets(result.scene.bearing, history.contact_angles, history.tilt_angles)
-    )
+    history = result.alone.history
+    offsets = contact_offsets(result.bearing, history.contact_angles, history.tilt_angles)
+    return np.where(history.separated, np.nan, offsets)
 
 
 def _draw_offsets(figure: SubFigure, result: Result) -> None:
     """One panel per surface, top surface uppermost, with the radius of the slider's face."""
-    bearing, off = result.scene.bearing, eccentricity(result) * MILLI
+    bearing, off = result.bearing, eccentricity(result) * MILLI
     column = strips(figure, bearing.layout.surfaces)
     for index, axes in enumerate(column[::-1]):
         edge = slider_radius(bearing, index) * MILLI

@@ -81,7 +81,8 @@ def animate(
         The path.
 
     Raises:
-        InputError: a time outside the run, a path that cannot be written, or .mp4 without ffmpeg. No file is written.
+        InputError: a time outside the run, a bearing of a building, a path that cannot be written, or .mp4 without
+            ffmpeg. No file is written.
     """
     target = check_movie(path)
     if frames_per_second < 1:

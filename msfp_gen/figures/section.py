@@ -69,7 +69,7 @@ def plot_section(
         friction_circles: whether to draw sphere centres and friction circles.
 
     Raises:
-        InputError: a time outside the run, or a path that cannot be written.
+        InputError: a time outside the run, a bearing of a building, or a path that cannot be written.
     """
     then = at_times(result, peak_time(result) if time is None else time)
     (section,) = sections(then, azimuth)
@@ -99,7 +99,7 @@ class SectionDrawing:
     """
 
     def __init__(self, axes: Axes, then: Result, section: Section, row: int = 0) -> None:
-        history, last = then.history, len(section.bodies) - 1
+        history, last = then.alone.history, len(section.bodies) - 1
         self.history = history
         self.slides, self.on_rim = sliding_surfaces(history), rims_in_contact(history)
         self.apart = history.separated

@@ -47,7 +47,7 @@ def view(result: Result, count: int = FRAMES) -> dict[str, Any]:
     about.
     """
     shown = at_times(result, instants(result, count))
-    history, bearing, where = shown.history, shown.scene.bearing, poses(shown)
+    history, bearing, where = shown.alone.history, shown.bearing, poses(shown)
     frames = {
         "time": history.time,
         "bottom": where.bottom,

@@ -177,7 +177,7 @@ class Page(NamedTuple):
 
 
 def _of_bearing(result: Result) -> str:
-    layout = result.scene.bearing.layout
+    layout = result.bearing.layout
     return (
         f"Simulation of a friction pendulum bearing of {layout.n} bodies, with {layout.m} sliding surfaces concave up "
         f"and {layout.p} concave down"
@@ -228,7 +228,7 @@ def write_report(
 ) -> Path:
     """Write the HTML report of a run to `path`; the file appears only when complete. Arguments as `report_html`.
 
-    Raises InputError for a path that does not end in .html or cannot be written.
+    Raises InputError for a bearing of a building, and for a path that does not end in .html or cannot be written.
     """
     return write_page(path, lambda: report_html(result, frames, progress, title))
 

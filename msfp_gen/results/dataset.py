@@ -134,11 +134,11 @@ def _columns_of_scene(scene: Scene) -> Places:
 def _attributes(result: Result) -> dict[str, str | int | float]:
     from msfp_gen.scene.file.stored_motion import PIECES, RECIPE, needs_pieces, scene_attribute
 
-    scene, counters = scene_attribute(result.scene), asdict(result.counters)
-    return attributes_of(result, edition(), scene, result.notes, counters) | {
+    scene, _, counters = result.alone
+    return attributes_of(result, edition(), scene_attribute(scene), result.notes, asdict(counters)) | {
         "extremes": json.dumps(result.extremes.table),
-        "motion": PIECES if needs_pieces(result.scene) else RECIPE,
-        **({} if result.scene.fidelity == "exact" else {"fidelity": result.scene.fidelity}),
+        "motion": PIECES if needs_pieces(scene) else RECIPE,
+        **({} if scene.fidelity == "exact" else {"fidelity": scene.fidelity}),
     }
 
 
@@ -316,7 +316,8 @@ def groups_of(result: Result) -> dict[str, xr.Dataset]:
 
     if result.mounting is not None:
         return {}
-    motion = {GROUP: to_pieces(result.scene.motion)} if needs_pieces(result.scene) else {}
+    scene = result.alone.scene
+    motion = {GROUP: to_pieces(scene.motion)} if needs_pieces(scene) else {}
     return motion | ({} if result.gradients is None else {GRADIENT: gradient_group(result)})
 
 

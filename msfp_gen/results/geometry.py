@@ -46,7 +46,8 @@ class Poses:
 
 def poses(result: Result) -> Poses:
     """The stack of `result` in every row; `joining.at_times` gives a result with rows at other times."""
-    history, bearing, motion = result.history, result.scene.bearing, result.scene.motion
+    (scene, history, _), bearing = result.alone, result.bearing
+    motion = scene.motion
     base = motion.rotation(np.clip(history.time, 0.0, motion.duration))
     angles = np.concatenate([base[:, None], history.tilt_angles], axis=1)
     basis = body_bases(angles)
@@ -121,7 +122,7 @@ def friction_circles(result: Result) -> Array:
     While the surface slides, the line of force is tangent to this circle about the sphere centre (docs/model.md).
     """
     mu = result.friction_coefficient
-    radii: Array = result.scene.bearing.arrays()["radius"] * mu / np.sqrt(1 + mu**2)
+    radii: Array = result.bearing.arrays()["radius"] * mu / np.sqrt(1 + mu**2)
     return radii
 
 
@@ -294,7 +295,7 @@ def sections(result: Result, azimuth: float | None = None) -> list[Section]:
     sideways, as far as possible. The sections of bodies are exact; contact points, centres and lines of force, which
     may lie beside the plane, are projected on it.
     """
-    bearing, stack = result.scene.bearing, poses(result)
+    bearing, stack = result.bearing, poses(result)
     angle = azimuth_of(result) if azimuth is None else azimuth
     shapes = [outline(bearing, body) for body in range(bearing.layout.n)]
     faces = [(bearing.slider(surface), slider_face(bearing, surface)) for surface in range(bearing.layout.surfaces)]

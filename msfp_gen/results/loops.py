@@ -243,7 +243,7 @@ def surface_demands(one: Result, rows: slice | None = None) -> tuple[SurfaceDema
 
 def _slips(result: Result, rows: slice, whole: bool) -> tuple[Array, Array, Array]:
     """Largest slip velocity [m/s] and friction power [W], and its integral [J], of every surface, shape (n-1,) each."""
-    history, fastest = result.history, result.extremes.slip_speed
+    history, fastest = result.alone.history, result.extremes.slip_speed
     speed = np.where(history.separated, 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
     power = result.friction_coefficient[rows] * history.normal_force[rows] * speed
     heat = np.asarray(np.trapezoid(power, history.time[rows], axis=0))
@@ -310,7 +310,7 @@ class Branch:
 
 def signed_slip(result: Result, direction: Array) -> tuple[Array, Array]:
     """Slip of every surface along the unit vector `direction`, shape (2,), and its plastic part: (T, n-1) each [m]."""
-    history, bearing = result.history, result.scene.bearing
+    history, bearing = result.alone.history, result.bearing
     # t_3 of a body tilts towards (theta, -psi); the slip of a surface that is concave up is opposite to it (3.19).
     tilt = history.tilt_angles[..., 1] * direction[0] - history.tilt_angles[..., 0] * direction[1]
     slip = -np.array(bearing.layout.signs) * np.copysign(history.sliding, tilt)

@@ -25,7 +25,7 @@ from msfp_gen.results.characterise import Characterisation
 from msfp_gen.results.characterise import characterise as characterise_bearing
 from msfp_gen.results.files import Storage, read_result
 from msfp_gen.results.gradients import Gradients
-from msfp_gen.results.history import Counters, Event, Extremes, History
+from msfp_gen.results.history import BearingRows, Counters, Event, Extremes, History
 from msfp_gen.results.note import DECISIVE, Note, by_importance
 from msfp_gen.results.summary import (
     rows_of_bearing,
@@ -39,7 +39,7 @@ from msfp_gen.results.summary import (
 from msfp_gen.results.verdict import Verdict, verdict_of
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.system import kinds
+from msfp_gen.scene.system import System, kinds
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
@@ -227,6 +227,14 @@ class Mounting:
     summary: Mapping[str, Any]
 
 
+class Alone(NamedTuple):
+    """What the run of one bearing alone has, and a bearing below a building has not."""
+
+    scene: Scene
+    history: History
+    counters: Counters
+
+
 # (word of an extreme, field of the history) -> field of `Extremes`, the same over all steps of a run.
 OVER_STEPS = {
     ("peak", "displacement"): "displacement",
@@ -251,22 +259,23 @@ class Result(AnyResult):
     A RunError has one in `.result` if the run failed after its start. History and notes are made of the recorded rows
     when they are asked for first.
 
-    history: rows; below a building those of `BearingRows` alone, with the displacement across bearing and interface,
-    base_displacement of the ground below it, and top_moment about its upper end. events: located by the run; none below
-    a building. status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one
-    line of text, "" for a run that succeeded. counters: the work of the solver. provenance: versions, model keys and
-    solver options with which the result was computed. notes: messages of the monitors, in order of time
-    (docs/effects.md). recorded_extremes: of all accepted steps; None where only the rows are known. gradients:
-    derivatives with respect to parameters; None: not computed. mounting: None for a bearing alone; below a building,
-    whose scene is `scene`, what that tells of the bearing.
+    history: rows, a `History`; below a building the `BearingRows` that its rows have of a bearing, with the
+    displacement across bearing and interface, base_displacement of the ground below it, and top_moment about its upper
+    end. events: located by the run; none below a building. status: "ok", "stopped" (the stop condition of the scene was
+    met) or the name of a failure; message: one line of text, "" for a run that succeeded. counters: the work of the
+    solver; None below a building, whose solver steps all bearings at once. provenance: versions, model keys and solver
+    options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
+    recorded_extremes: of all accepted steps; None where only the rows are known. gradients: derivatives with respect to
+    parameters; None: not computed. mounting: None for a bearing alone; below a building, whose scene is `scene`, what
+    that tells of the bearing.
     """
 
     source: ClassVar[str] = "msfp-gen"
     storage: ClassVar[Storage] = dataset.STORAGE
-    scene: Scene
-    history: Later[History] = Later()
+    scene: System
+    history: Later[BearingRows] = Later()
     events: tuple[Event, ...] = ()
-    counters: Counters = field(default_factory=Counters)
+    counters: Counters | None = field(default_factory=Counters)
     status: str = "ok"
     message: str = ""
     provenance: dict[str, str] = field(default_factory=dict)
@@ -279,6 +288,17 @@ class Result(AnyResult):
     def bearings(self) -> tuple[Result]:
         """The bearing itself."""
         return (self,)
+
+    @property
+    def alone(self) -> Alone:
+        """Scene, rows and counters of a bearing that was run alone. Raises InputError below a building."""
+        scene, history, counters = self.scene, self.history, self.counters
+        if isinstance(scene, Scene) and isinstance(history, History) and counters is not None:
+            return Alone(scene, history, counters)
+        raise InputError(
+            f"{self.label}: the rows of a building have no angles, slips and energies of the parts of a bearing; run "
+            "the bearing alone, or draw its overview, loops, orbit or sliding (docs/buildings.md)"
+        )
 
     @property
     def number(self) -> int:
@@ -298,17 +318,19 @@ class Result(AnyResult):
     @property
     def bearing(self) -> Bearing:
         """The bearing that was run."""
-        return self.scene.bearing if self.mounting is None else self.mounting.bearing
+        return self.scene.every_bearing[0] if self.mounting is None else self.mounting.bearing
 
     @property
     def effects(self) -> Effects:
         """The effects of the model at the start."""
-        return self.scene.modelled if self.mounting is None else self.mounting.effects
+        return self.scene.every_effects[0] if self.mounting is None else self.mounting.effects
 
     @property
     def axial_load(self) -> float | None:
         """Constant axial load on the top plate, below a building at rest [N]; None if there is none, or it varies."""
-        return constant_load(self.scene) if self.mounting is None else self.mounting.axial_load
+        if self.mounting is not None:
+            return self.mounting.axial_load
+        return constant_load(self.scene) if isinstance(self.scene, Scene) else None
 
     @property
     def one_pendulum(self) -> bool:
@@ -317,8 +339,8 @@ class Result(AnyResult):
 
     @property
     def work(self) -> Mapping[str, float]:
-        """Counters of the work of the solver, and wall_time [s]."""
-        return asdict(self.counters)
+        """Counters of the work of the solver, and wall_time [s]; {} below a building, whose result has them."""
+        return {} if self.counters is None else asdict(self.counters)
 
     @property
     def compared(self) -> dict[str, Array]:
@@ -341,7 +363,7 @@ class Result(AnyResult):
         recorded = self.recorded_extremes
         if recorded is not None and self.mounting is not None:
             return recorded
-        rows = Extremes.of_rows(self.history)
+        rows = Extremes.of_rows(self.alone.history)
         return rows if recorded is None else rows | recorded
 
     def over_steps(self, word: str, field: str) -> Array | None:
@@ -354,8 +376,11 @@ class Result(AnyResult):
 
     @property
     def friction_coefficient(self) -> Array:
-        """Friction coefficient mu of every surface, ndarray, shape (T, n-1), [-]: recorded, or that of the bearing."""
-        recorded = self.history.friction_coefficient
+        """Friction coefficient mu of every surface, ndarray, shape (T, n-1), [-]: recorded, or that of the bearing.
+
+        Raises InputError below a building.
+        """
+        recorded = self.alone.history.friction_coefficient
         if recorded is not None:
             return recorded
         return np.broadcast_to(self.bearing.arrays()["friction"], self.history.normal_force.shape)

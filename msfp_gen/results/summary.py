@@ -145,12 +145,13 @@ def summarise(result: Result) -> dict[str, Any]:
     """
     if result.mounting is not None:
         return {**result.mounting.summary, **result.of_bearing}
-    counters = asdict(result.counters)
+    _, history, work = result.alone
+    counters = asdict(work)
     wall_time = counters.pop("wall_time")
     return {
-        **summary_of_run(result, result.history.time, counters, wall_time),
+        **summary_of_run(result, history.time, counters, wall_time),
         **result.of_bearing,
-        "energy": energy_balance(result.history),
+        "energy": energy_balance(history),
     }
 
 
@@ -325,7 +326,7 @@ def summarise_gradients(result: Result) -> dict[str, dict[str, Any]]:
     gradients = gradients_of(result)
     recorded = result.recorded_extremes
     assert recorded is not None  # a run that computed derivatives has recorded its extremes
-    slopes = gradients_of_extremes(gradients, result.history, recorded)
+    slopes = gradients_of_extremes(gradients, result.alone.history, recorded)
     gradients_of_summary = dict[str, dict[str, Any]]()
     for i, parameter in enumerate(gradients.parameters):
         own = {name: values[i] for name, values in slopes.items()}
@@ -363,7 +364,7 @@ def _ratio_slope(result: Result, parameter: Parameter, slope: float) -> float | 
 
 def _load_slope(result: Result, parameter: Parameter) -> float:
     """Derivative of `axial_load` with respect to a parameter."""
-    scene, name = result.scene, parameter.path
+    scene, name = result.alone.scene, parameter.path
     gravity, mass = scene.bearing.gravity, float(getattr(scene.top, "mass", 0.0)) if scene.top.kind == "mass" else 0.0
     slopes = {"top.axial_load": 1.0, "top.force[2]": -1.0, "top.mass": gravity, "bearing.gravity": mass}
     if name == "load.scale" and scene.load is not None:

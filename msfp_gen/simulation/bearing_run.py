@@ -12,7 +12,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import RunError
 from msfp_gen.model.compiled import Run
 from msfp_gen.model.model import Model, build_model
-from msfp_gen.results.history import Counters, History
+from msfp_gen.results.history import BearingRows, Counters
 from msfp_gen.results.joining import joined
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.results.result import Result
@@ -204,8 +204,9 @@ def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, t
         end = _finished(settling, gradients=moving, gradient_errors=False)
     except RunError as error:
         raise RunError(f"before the start, while the plates are tilted: {error}", status=error.status) from error
-    state = state_at_rest(end.history.tilt_angles[-1], end.history.friction_state[-1])
-    return replace(scene, initial_state=state), start_slopes(end.history, end.gradients, parameters)
+    history = end.alone.history
+    state = state_at_rest(history.tilt_angles[-1], history.friction_state[-1])
+    return replace(scene, initial_state=state), start_slopes(history, end.gradients, parameters)
 
 
 def _result(run: BearingRun, parts: Parts) -> Result:
@@ -214,7 +215,7 @@ def _result(run: BearingRun, parts: Parts) -> Result:
     events = tuple(event for s in segments for event in events_of(s.run, s.azimuth))
     return Result(
         scene=scene,
-        history=partial(_history, parts),
+        history=partial(_history, parts, scene),
         events=events,
         counters=Counters(
             **{name: sum(int(count[name]) for count in counts) for name in counts[0]},
@@ -232,9 +233,9 @@ def _result(run: BearingRun, parts: Parts) -> Result:
     )
 
 
-def _history(parts: Parts, run: Result) -> History:
+def _history(parts: Parts, scene: Scene, _: Result) -> BearingRows:
     """The history of a result."""
-    scene, before = run.scene, start_temperatures(parts[-1][0].effects.law, run.scene)
+    before = start_temperatures(parts[-1][0].effects.law, scene)
     histories = [history_of(model, rows, azimuth, is_sprung(scene.top)) for model, rows, azimuth in parts]
     return joined(histories, scene.output_step, before)
 
@@ -243,5 +244,6 @@ def _notes(
     of_monitors: tuple[Note, ...], effects: Effects, of_gradients: tuple[Note, ...], run: Result
 ) -> tuple[Note, ...]:
     """The notes of a result. effects: of its last segment."""
-    of_rows = history_notes(run.scene, effects, run.history, run.counters.steps, run.recorded_extremes)
+    scene, history, counters = run.alone
+    of_rows = history_notes(scene, effects, history, counters.steps, run.recorded_extremes)
     return of_monitors + of_rows + landing_notes(run.events) + of_gradients

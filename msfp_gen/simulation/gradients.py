@@ -355,7 +355,7 @@ def with_gradient_errors(result: Result, run: Callable[[Scene], Result]) -> Resu
 
     run: of a scene, with the same derivatives. Raises RunError where it is interrupted.
     """
-    scene, gradients = result.scene, result.gradients
+    scene, gradients = result.alone.scene, result.gradients
     assert gradients is not None
     solver, atol = scene.solver, scene.solver.atol_angle
     tenth = replace(solver, rtol=solver.rtol / 10, atol_angle=None if atol is None else atol / 10)

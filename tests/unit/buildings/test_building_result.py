@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -19,7 +20,8 @@ from msfp_gen import Effects, InputError, Result, RunError, Solver, changed_scen
 from msfp_gen.buildings.explain import explain
 from msfp_gen.buildings.notes import shared
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.figures import figures_of
+from msfp_gen.figures import FIGURES, animate, figures_of
+from msfp_gen.report import write_report
 from msfp_gen.results.characterise import characterised, csv_rows
 from msfp_gen.results.files import table_of
 from msfp_gen.results.history import ENERGY_BELOW
@@ -423,3 +425,31 @@ def test_words_of_the_field_come_first():
     glossary = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
     for word in ("isolator", "joint", "diaphragm", "degree of freedom", "base shear"):
         assert f"| {word} | `" in glossary
+
+
+DRAWN = {name: (draw, ".png") for name, draw in FIGURES.items()}
+DRAWN |= {"movie": (partial(animate, seconds=0.2), ".gif"), "report": (write_report, ".html")}
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_bearing_of_a_building_is_drawn_or_refused_in_one_line(name: str, tmp_path: Path):
+    one, (draw, suffix) = pushed().bearings[1], DRAWN[name]
+    file = tmp_path / f"one{suffix}"
+    if name in figures_of(one):
+        draw(one, file)
+        assert file.stat().st_size > 1000
+        return
+    with pytest.raises(InputError, match=r"^bearing 2 \(B\): the rows of a building have no .*; run the bearing.*$"):
+        draw(one, file)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_bearing_of_a_building_has_no_counters_and_no_scene_of_its_own():
+    one = pushed().bearings[1]
+    assert set(figures_of(one)) == {"overview", "loops", "orbit", "sliding"} and len(DRAWN) == 10
+    assert one.counters is None and one.work == {} and pushed().work["steps"] > 0
+    for read in (lambda: one.alone, lambda: one.friction_coefficient):
+        with pytest.raises(InputError, match="rows of a building"):
+            read()
+    alone = loops_of_one()
+    assert alone.alone == (alone.scene, alone.history, alone.counters)
