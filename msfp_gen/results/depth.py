@@ -34,7 +34,7 @@ def temperature_at_depth(result: Result, depth: float) -> Array:
     """
     if not 0 <= depth < inf:
         raise InputError(f"depth = {depth}: a distance below the sliding surface [m]; give 0 or more")
-    temperature, bearing = result.history.temperature, result.scene.bearing
+    temperature, bearing = result.history.temperature, result.bearing
     if temperature is None:
         raise InputError(
             "temperature_at_depth: this run has no temperatures; give effects.friction = 'pvt' or 'pvtd', or a formula "
