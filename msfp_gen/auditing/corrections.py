@@ -118,11 +118,8 @@ def _other_acceleration(data: Histories, stated: Stated) -> tuple[dict[str, floa
 
 
 def _other_unit(data: Histories, stated: Stated) -> tuple[dict[str, float], str, float] | None:
-    """The unit of one quantity with which radius and friction are those stated; None: there is none.
-
-    Units of force and of axial force that fit alike are told apart by the weight of the stated mass.
-    """
-    mass = stated_mass(data, stated)
+    """The unit of one quantity with which radius and friction are those stated; None: there is none."""
+    mass = stated_mass(data, stated)  # its weight tells apart units of force and of axial force that fit alike
     best: tuple[tuple[float, float], dict[str, float], str, float] | None = None
     for kind, units in (("displacement", LENGTHS), ("force", FORCES), ("axial", FORCES)):
         names = [name for name in data.columns if name.startswith(kind)]

@@ -136,10 +136,7 @@ def _taken(by: Law | Spin | None) -> Collection[str]:
 def _check_takers(
     surface: Surface, index: int, names: Iterable[str], chosen: str, takers: Mapping[str, Law | Spin | None], word: str
 ) -> None:
-    """Raise InputError where a surface has one of these numbers, which the taker of this word does not take.
-
-    chosen: what has the word, for the message.
-    """
+    """Raise InputError where a surface has a number that the taker of the word, `chosen` in messages, does not take."""
     values = vars(surface)
     for name in names:
         if values[name] is not None and name not in _taken(takers[word]):
