@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
@@ -292,9 +292,9 @@ class Result(AnyResult):
     @property
     def alone(self) -> Alone:
         """Scene, rows and counters of a bearing that was run alone. Raises InputError below a building."""
-        scene, history, counters = self.scene, self.history, self.counters
-        if isinstance(scene, Scene) and isinstance(history, History) and counters is not None:
-            return Alone(scene, history, counters)
+        history, counters = self.history, self.counters
+        if self.mounting is None and isinstance(history, History) and counters is not None:
+            return Alone(cast("Scene", self.scene), history, counters)
         raise InputError(
             f"{self.label}: the rows of a building have no angles, slips and energies of the parts of a bearing; run "
             "the bearing alone, or draw its overview, loops, orbit or sliding (docs/buildings.md)"
@@ -330,7 +330,7 @@ class Result(AnyResult):
         """Constant axial load on the top plate, below a building at rest [N]; None if there is none, or it varies."""
         if self.mounting is not None:
             return self.mounting.axial_load
-        return constant_load(self.scene) if isinstance(self.scene, Scene) else None
+        return constant_load(cast("Scene", self.scene))
 
     @property
     def one_pendulum(self) -> bool:
