@@ -29,8 +29,8 @@ from .schedule import (
     COLUMNS,
     LISTS,
     Call,
-    Kept,
     List,
+    ListStorage,
     Over,
     Pass,
     Per,
@@ -44,7 +44,7 @@ WIDTH = 8  # columns of a Jacobian that are computed at once
 FILES = ("kernels.h", "equations.h", "equations.c")
 AXES = ("x", "y", "z")
 ANGLES = ("psi", "theta", "phi")
-BY_GIVEN = replace(
+BY_INPUTS = replace(
     BY_VARIABLES,
     seeds=(*(BY_VARIABLES.seeds or ()), *((name, ("Y", "Z")) for name in ("friction_force", "friction_stage"))),
 )
@@ -57,7 +57,7 @@ def module_name(spec: ModelSpec) -> str:
     return f"equations_{spec.layout.name}"
 
 
-def given(spec: ModelSpec) -> dict[str, tuple[int, ...]]:
+def inputs_of(spec: ModelSpec) -> dict[str, tuple[int, ...]]:
     """What z holds: name -> shape."""
     count = spec.layout.surfaces
     shapes = {**dict.fromkeys("qva", (count, 3)), **dict.fromkeys("hg", (count, 2)), "contact": (count, 3)}
@@ -85,7 +85,7 @@ class _Layout:
         names = [field.name for field in self.block(LISTS[name]).fields]
         return self.starts[name] + index * len(names) + names.index(entry) if entry in names else -1
 
-    def given(self) -> Iterator[tuple[int, int]]:
+    def input_places(self) -> Iterator[tuple[int, int]]:
         """Both places of every number of z; the state of friction is read in two lists."""
         surfaces = range(self.equations.spec.layout.surfaces)
         for order in ("", "1", "2"):
@@ -175,17 +175,17 @@ def equations_alone(spec: ModelSpec, example: Any) -> Generated:
         "friction_force",
         "friction_stage",
     }
-    lists = [one for name, one in LISTS.items() if name in used and one.kept is not Kept.PARAMETERS]
+    lists = [one for name, one in LISTS.items() if name in used and one.storage is not ListStorage.PARAMETERS]
     parts = _Layout(equations, lists)
     programs = _programs(equations, {name for call in calls for name in call.programs})
     by_name = {program.name: program for program in programs}
     kernels = [lower(program) for program in programs]
-    derivatives = [lower(program) for program in directed(BY_GIVEN, schedules, by_name, equations.blocks).values()]
-    form = form_of(BY_GIVEN, schedules, derivatives)
+    derivatives = [lower(program) for program in directed(BY_INPUTS, schedules, by_name, equations.blocks).values()]
+    form = form_of(BY_INPUTS, schedules, derivatives)
     blocks = {use.block.name: use.block for program in programs for use in (*program.inputs, program.output) if use}
     drivers = [part(name, passes, by_name, [form]) for name, passes in schedules.items()]
-    names = {kind: i for i, kind in enumerate(given(spec))}
-    sizes = [prod(shape) for shape in given(spec).values()]
+    names = {kind: i for i, kind in enumerate(inputs_of(spec))}
+    sizes = [prod(shape) for shape in inputs_of(spec).values()]
     starts = [sum(sizes[:i]) for i in range(len(sizes))]
     context = {
         "version": __version__,
@@ -200,8 +200,8 @@ def equations_alone(spec: ModelSpec, example: Any) -> Generated:
         "drivers": drivers,
         "plain": _plain,
         "width": WIDTH,
-        "places": list(parts.given()),
-        "given": [(name, shape, starts[names[name]]) for name, shape in given(spec).items()],
+        "places": list(parts.input_places()),
+        "inputs": [(name, shape, starts[names[name]]) for name, shape in inputs_of(spec).items()],
         "total": sum(sizes),
         "results": parts.results(),
         "unknowns": [_in_z(*unknown, dict(zip(names, starts, strict=True))) for unknown in unknowns(spec)],

@@ -155,11 +155,11 @@ def transported_force(b: Blocks, c: Columns, massless: bool) -> Program:
     s: Symbols = p.read(c.twist, "s", active=True)
     above: Symbols = p.read(b.force, "up", active=True)
     gravity: Vector = (sp.Integer(0), sp.Integer(0), par["g"])
-    asked = subtract(gravity, cross(s["q0"], gravity))
+    acceleration = subtract(gravity, cross(s["q0"], gravity))
     if not massless:
         twice = scale(sp.Integer(2), cross(s["q1"], body["vc"]))
-        asked = add(asked, body["ac"], cross(s["q2"], body["rc"]), twice, s["t2"])
-    p.write(b.force, {"F": add(above["F"], scale(par["m"], asked))}, tangents=True)
+        acceleration = add(acceleration, body["ac"], cross(s["q2"], body["rc"]), twice, s["t2"])
+    p.write(b.force, {"F": add(above["F"], scale(par["m"], acceleration))}, tangents=True)
     return p
 
 

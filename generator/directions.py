@@ -21,13 +21,13 @@ from .schedule import (
     LISTS,
     VARIABLES,
     Call,
-    Kept,
+    ListStorage,
     Schedule,
     Solve,
-    at_hand,
     block_of,
     calls_of,
     list_name,
+    output_is_stored,
     passes_of,
 )
 
@@ -89,9 +89,9 @@ def directed(
         ]
         results = _written(call, program, blocks)
         wanted = frozenset(name for name, entry in results.items() if read is None or entry in read)
-        given = at_hand(call) and not along.again
+        stored = output_is_stored(call) and not along.again
         if any(use.active for use in inputs):
-            found[program.name] = directional(program, along.suffix, along.columns, inputs, wanted, given)
+            found[program.name] = directional(program, along.suffix, along.columns, inputs, wanted, stored)
     return found
 
 
@@ -123,7 +123,7 @@ def _inputs(every: list[tuple[Call, Program]], blocks: Blocks) -> Iterable[Entry
     """The inputs of an evaluation that are neither parameters nor fixed."""
     written = {list_name(place) for call, _ in every for place in call.writes}
     for name in dict.fromkeys(list_name(place) for call, _ in every for place in call.reads):
-        if name not in written and LISTS[name].kept is not Kept.PARAMETERS:
+        if name not in written and LISTS[name].storage is not ListStorage.PARAMETERS:
             yield from ((name, field.name) for field in block_of(name, blocks).fields if not field.fixed)
 
 

@@ -18,8 +18,8 @@ from .schedule import (
     VARIABLES,
     Call,
     If,
-    Kept,
     List,
+    ListStorage,
     Over,
     Pass,
     Per,
@@ -27,7 +27,6 @@ from .schedule import (
     Solve,
     Values,
     When,
-    at_hand,
     beside,
     calls_of,
     check,
@@ -37,6 +36,7 @@ from .schedule import (
     list_name,
     list_of,
     momentum_balances,
+    output_is_stored,
     passes_of,
     two_port,
     unknowns,
@@ -199,17 +199,19 @@ def schedule_context(
         "directed": list(with_directions),
         "of_ends": list(of_ends),
         "of_variables": list(of_variables),
-        "blocks": [_declared(LISTS[name], equations) for name in used if LISTS[name].kept is Kept.HERE],
+        "blocks": [_declared(LISTS[name], equations) for name in used if LISTS[name].storage is ListStorage.HERE],
         "block_tangents": [
             _declared(LISTS[name], equations) for name in used if name in moving and not LISTS[name].tangents
         ],
         "block_directions": [
             _declared(LISTS[name], equations)
             for name in directed
-            if not LISTS[name].directions and LISTS[name].kept is not Kept.PARAMETERS
+            if not LISTS[name].directions and LISTS[name].storage is not ListStorage.PARAMETERS
         ],
         "blocks_by_ends": [
-            _declared(LISTS[name], equations) for name in _lists(of_ends) if LISTS[name].kept is not Kept.PARAMETERS
+            _declared(LISTS[name], equations)
+            for name in _lists(of_ends)
+            if LISTS[name].storage is not ListStorage.PARAMETERS
         ],
         "variables": [
             (kind, [one for name, quantities in parts if (one := _entries(name, quantities, equations))["entries"]])
@@ -285,7 +287,7 @@ def part(name: str, passes: Iterable[Pass], programs: Programs, along: Iterable[
     return {
         "name": name,
         "added": {form: [member(list_of(place), form) for place in added] for form in forms},
-        "constant": not any(list_of(place).kept is Kept.WORK for call in calls for place in call.writes),
+        "constant": not any(list_of(place).storage is ListStorage.WORK for call in calls for place in call.writes),
         "fails": any(isinstance(call.by, Solve) and call.by.fails for call in calls),
         "unused": {form: _unused(line for _, many in written for line in many) for form, written in lines.items()},
         "passes": {
@@ -315,8 +317,8 @@ def _unused(lines: Iterable[Line]) -> list[str]:
 def member(one: List, form: str) -> str:
     """C of the blocks of a list, or of their derivatives; empty for parameters where they are constant."""
     if form == "values":
-        return f"{one.kept.value}->{one.name}"
-    if one.kept is Kept.PARAMETERS:
+        return f"{one.storage.value}->{one.name}"
+    if one.storage is ListStorage.PARAMETERS:
         return f"dp->{one.name}" if form == "directions" else ""
     if form == "tangents":
         return f"w->d{one.name}" if one.tangents else f"ds->{one.name}"
@@ -410,7 +412,7 @@ def _directions(call: Call, programs: Programs, form: Form) -> Iterator[Line]:
         return
     writes = _all_in_c(call.writes, form.along.name)
     names = {list_name(place) for place in call.writes}
-    values = any(LISTS[name].kept is Kept.HERE for name in names & form.read)
+    values = any(LISTS[name].storage is ListStorage.HERE for name in names & form.read)
     many = ((name, list(_direction(call, programs[name], writes, values, form))) for name in call.programs)
     yield from _chosen(call, writes, many)
 
@@ -434,7 +436,7 @@ def _direction(call: Call, program: Program, writes: list[str], with_values: boo
     if with_values:
         yield from _evaluated(call, program)
     derivatives = form.kernels[program.name].program
-    values = _all_in_c(call.writes, "values") if at_hand(call) and not form.along.again else []
+    values = _all_in_c(call.writes, "values") if output_is_stored(call) and not form.along.again else []
     given = [*_all_in_c(call.reads, "values"), *values, *_moving(call, derivatives, form.along.name)]
     size = f"{_size(program)} * {derivatives.columns}"
     yield from _written(call, f"msfp_{derivatives.name}", given, writes, size)

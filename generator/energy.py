@@ -159,7 +159,7 @@ def works(b: Blocks, rims: bool, uplift: bool) -> Program:
     lock: Symbols = p.read(b.power, "lock")
     friction: Symbols = p.read(b.friction_power, "f")
     rim: Symbols = p.read(b.rim_energy, "rim") if rims else {"lost": sp.Integer(0)}
-    seat: Symbols = p.read(b.unilateral_energy, "seat") if uplift else {"lost": sp.Integer(0)}
+    unilateral: Symbols = p.read(b.unilateral_energy, "unilateral") if uplift else {"lost": sp.Integer(0)}
     prescribed = p.let(top["prescribed"] + base["power"])
     p.write(
         b.works,
@@ -170,7 +170,7 @@ def works(b: Blocks, rims: bool, uplift: bool) -> Program:
             "contact_dissipated": friction["damped"],
             "rim_dissipated": rim["lost"],
             "top_dissipated": top["damped"],
-            "seat_dissipated": seat["lost"],
+            "seat_dissipated": unilateral["lost"],
             "prescribed": prescribed,
             "load": top["load"],
         },

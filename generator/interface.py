@@ -104,11 +104,10 @@ def interface_context(spec: ModelSpec, shape: Any, header: str) -> dict[str, Any
 
 
 def _api_functions(spec: ModelSpec, symbols: set[str], header: str) -> Iterator[tuple[str, str]]:
-    """The functions of the table of a model and those of the runtime behind them; of gradients and two-ports where it
-    has them. What makes a two-port and ends it is always there, to refuse; so are the weights of methods.
-    """
+    """The functions of the table of a model and those of the runtime behind them, as far as it has them."""
     without = {"gradient": not spec.gradients, "port_": not spec.effects.permits_moving_ends}
     absent = tuple(prefix for prefix, true in without.items() if true)
+    # always there, to refuse, and for the weights of methods
     always = ("port_new", "port_new_loaded", "port_free", "port_method")
     for name in functions(header):
         own = [symbol for symbol in (f"msfp_api_{name}", f"msfp_{name}") if symbol in symbols]

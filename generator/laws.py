@@ -61,8 +61,8 @@ def yield_displacement(p: Program, seated: bool, par: Symbols, N: sp.Expr) -> sp
     if not seated:
         dy: sp.Expr = par["dy"]
         return dy
-    half, seat = p.let(par["dy"] / 2), p.let(par["mu"] * N / par["ks"])
-    return p.let(par["dy"] - p.let(Select(half - seat, seat, half)), "dy")
+    half, contact = p.let(par["dy"] / 2), p.let(par["mu"] * N / par["ks"])
+    return p.let(par["dy"] - p.let(Select(half - contact, contact, half)), "dy")
 
 
 def bouc_wen_rates(law: str, p: Program, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:

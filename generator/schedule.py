@@ -75,13 +75,13 @@ class Solve:
     Attributes:
         forms: the forms of derivatives (`drivers.py`) that there are: "tangents", "directions", "by_ends".
         emitted: the forms of which the derivatives are a program, which is emitted.
-        given: whether it gives the results where it asks for the derivatives.
+        gives_results: whether it gives the results where it asks for the derivatives.
         fails: whether it may find no solution, with a status at which the evaluation ends.
     """
 
     forms: frozenset[str]
     emitted: frozenset[str] = frozenset()
-    given: bool = False
+    gives_results: bool = False
     fails: bool = False
 
 
@@ -123,7 +123,7 @@ Place = tuple[str, int]
 """A list and the number of a block in it."""
 
 
-class Kept(Enum):
+class ListStorage(Enum):
     """The record in which a list is kept, which decides where its derivatives are."""
 
     PARAMETERS = "p"
@@ -146,62 +146,62 @@ class List:
     Attributes:
         kind: name of the block in `Blocks`.
         name: name in the record that keeps it.
-        kept: the parameters, the work area of an evaluation, or the blocks of the schedules alone.
+        storage: the parameters, the work area of an evaluation, or the blocks of the schedules alone.
         per: of what it has one block each.
-        given: whether it is given to an evaluation, so that no program needs to have written it.
+        is_input: whether an evaluation is given it, so that no program needs to have written it.
         tangents: whether the work area keeps derivatives by the variables of a step, which the steppers read.
         directions: whether the work area keeps derivatives by parameters, likewise.
     """
 
     kind: str
     name: str
-    kept: Kept = Kept.HERE
+    storage: ListStorage = ListStorage.HERE
     per: Per = Per.STACK
-    given: bool = False
+    is_input: bool = False
     tangents: bool = False
     directions: bool = False
 
 
 LISTS: Mapping[str, List] = {
-    "body_parameters": List("body_parameters", "body", Kept.PARAMETERS, Per.BODY, given=True),
-    "surface_parameters": List("surface_parameters", "surface", Kept.PARAMETERS, Per.SURFACE, given=True),
-    "top_parameters": List("top_parameters", "top", Kept.PARAMETERS, given=True),
-    "coefficient": List("coefficient", "coefficient", Kept.WORK, Per.SURFACE, given=True),
-    "foot_stage": List("foot_stage", "foot_stage", given=True),
-    "upright": List("upright", "upright", given=True),
-    "foot": List("foot", "foot", Kept.WORK, directions=True),
-    "frame": List("body", "frame", given=True),
-    "x": List("coordinates", "x", Kept.WORK, Per.BODY, given=True, tangents=True, directions=True),
-    "body": List("body", "body", Kept.WORK, Per.BODY, tangents=True, directions=True),
-    "load_force": List("force", "load_force", given=True),
-    "load_moment": List("moment", "load_moment", given=True),
-    "force": List("force", "force", Kept.WORK, Per.BODY, tangents=True, directions=True),
-    "moment": List("moment", "moment", Kept.WORK, Per.BODY, tangents=True, directions=True),
-    "unknowns": List("unknowns", "unknowns", per=Per.SURFACE, given=True),
-    "friction": List("friction", "friction", per=Per.SURFACE, given=True),
+    "body_parameters": List("body_parameters", "body", ListStorage.PARAMETERS, Per.BODY, is_input=True),
+    "surface_parameters": List("surface_parameters", "surface", ListStorage.PARAMETERS, Per.SURFACE, is_input=True),
+    "top_parameters": List("top_parameters", "top", ListStorage.PARAMETERS, is_input=True),
+    "coefficient": List("coefficient", "coefficient", ListStorage.WORK, Per.SURFACE, is_input=True),
+    "foot_stage": List("foot_stage", "foot_stage", is_input=True),
+    "upright": List("upright", "upright", is_input=True),
+    "foot": List("foot", "foot", ListStorage.WORK, directions=True),
+    "frame": List("body", "frame", is_input=True),
+    "x": List("coordinates", "x", ListStorage.WORK, Per.BODY, is_input=True, tangents=True, directions=True),
+    "body": List("body", "body", ListStorage.WORK, Per.BODY, tangents=True, directions=True),
+    "load_force": List("force", "load_force", is_input=True),
+    "load_moment": List("moment", "load_moment", is_input=True),
+    "force": List("force", "force", ListStorage.WORK, Per.BODY, tangents=True, directions=True),
+    "moment": List("moment", "moment", ListStorage.WORK, Per.BODY, tangents=True, directions=True),
+    "unknowns": List("unknowns", "unknowns", per=Per.SURFACE, is_input=True),
+    "friction": List("friction", "friction", per=Per.SURFACE, is_input=True),
     "rim_coordinates": List("rim_coordinates", "rim_coordinates", per=Per.SURFACE),
-    "rim": List("rim", "rim", Kept.WORK, Per.SURFACE, directions=True),
+    "rim": List("rim", "rim", ListStorage.WORK, Per.SURFACE, directions=True),
     "relative": List("relative", "relative", per=Per.SURFACE),
     "report_contact": List("report_contact", "report_contact", per=Per.SURFACE),
     "linear": List("linear", "linear", per=Per.BODY),
     "angular": List("angular", "angular", per=Per.BODY),
     "balances": List("balances", "balances", per=Per.BODY),
-    "contact_frame": List("contact_frame", "contact_frame", Kept.WORK, Per.SURFACE, directions=True),
-    "friction_previous": List("friction_previous", "friction_previous", per=Per.SURFACE, given=True),
-    "friction_stage": List("friction_stage", "friction_stage", Kept.WORK, Per.SURFACE, directions=True),
-    "friction_force": List("friction_force", "friction_force", per=Per.SURFACE, given=True),
-    "contact": List("contact", "contact", Kept.WORK, Per.SURFACE, directions=True),
+    "contact_frame": List("contact_frame", "contact_frame", ListStorage.WORK, Per.SURFACE, directions=True),
+    "friction_previous": List("friction_previous", "friction_previous", per=Per.SURFACE, is_input=True),
+    "friction_stage": List("friction_stage", "friction_stage", ListStorage.WORK, Per.SURFACE, directions=True),
+    "friction_force": List("friction_force", "friction_force", per=Per.SURFACE, is_input=True),
+    "contact": List("contact", "contact", ListStorage.WORK, Per.SURFACE, directions=True),
     "local_moment": List("moment", "local_moment", per=Per.SURFACE),
-    "unilateral": List("unilateral", "unilateral", Kept.WORK, Per.SURFACE, directions=True),
-    "rim_wrench": List("rim_wrench", "rim_wrench", Kept.WORK, Per.SURFACE),
+    "unilateral": List("unilateral", "unilateral", ListStorage.WORK, Per.SURFACE, directions=True),
+    "rim_wrench": List("rim_wrench", "rim_wrench", ListStorage.WORK, Per.SURFACE),
     "carried": List("force", "carried", per=Per.BODY),
     "excess": List("linear", "excess", per=Per.SURFACE),
     "joint_moment": List("moment", "joint_moment", per=Per.SURFACE),
-    "below": List("moment", "below", Kept.WORK, Per.BODY),
-    "base_motion": List("base_motion", "base_motion", given=True),
+    "below": List("moment", "below", ListStorage.WORK, Per.BODY),
+    "base_motion": List("base_motion", "base_motion", is_input=True),
     "energy": List("energy", "energy"),
     "rim_motion": List("rim_motion", "rim_motion", per=Per.SURFACE),
-    "lock": List("lock", "lock", Kept.WORK, Per.SURFACE, given=True, directions=True),
+    "lock": List("lock", "lock", ListStorage.WORK, Per.SURFACE, is_input=True, directions=True),
     "restraint": List("restraint", "restraint"),
     "rim_energy": List("rim_energy", "rim_energy"),
     "unilateral_energy": List("unilateral_energy", "unilateral_energy"),
@@ -210,8 +210,8 @@ LISTS: Mapping[str, List] = {
     "lock_power": List("power", "lock_power"),
     "friction_power": List("friction_power", "friction_power"),
     "works": List("works", "works"),
-    "far_end": List("far_end", "far_end", given=True),
-    "support": List("support", "support", given=True),
+    "far_end": List("far_end", "far_end", is_input=True),
+    "support": List("support", "support", is_input=True),
     "held": List("moment", "held"),
     "lower": List("end_wrench", "lower"),
     "upper": List("end_wrench", "upper"),
@@ -274,7 +274,7 @@ def _top(effects: Effects) -> Pass:
                 "foot",
                 ("top_parameters", "body[top]", "foot_stage"),
                 ("foot",),
-                Solve(frozenset({"directions", "by_ends"}), frozenset({"directions", "by_ends"}), given=True),
+                Solve(frozenset({"directions", "by_ends"}), frozenset({"directions", "by_ends"}), gives_results=True),
             ),
         ),
     )
@@ -394,7 +394,7 @@ def condensed(effects: Effects) -> Schedule:
     law = ("coefficient[j]",) if effects.law is not None else ()
     summed = Call("interface_force", ("body_parameters[j+1]", "body[j+1]", "force[j+1]"), ("force[j]",))
     forms, by_ends = frozenset({"tangents", "directions", "by_ends"}), frozenset({"by_ends"})
-    contact = Solve(forms, by_ends, given=True, fails=True)
+    contact = Solve(forms, by_ends, gives_results=True, fails=True)
     moments = (
         Call("surface_moment", ("contact[j]", *rim), ("local_moment[j]",)),
         Call("moment_to_world", ("body[j]", "local_moment[j]"), ("joint_moment[j]" if uplift else "moment[j]",)),
@@ -542,7 +542,7 @@ def beside(effects: Effects) -> Schedule:
         "gaps": (
             Pass(
                 Over.SURFACES,
-                (Call("gap", ("surface_parameters[j]", "body[j+1]"), ("gap[j]",), replace(by, given=True)),),
+                (Call("gap", ("surface_parameters[j]", "body[j+1]"), ("gap[j]",), replace(by, gives_results=True)),),
             ),
         ),
     }
@@ -558,11 +558,16 @@ def list_of(place: str) -> List:
     return LISTS[list_name(place)]
 
 
-def at_hand(call: Call) -> bool:
+def output_is_stored(call: Call) -> bool:
     """Whether the work area holds the results of a call while it is differentiated."""
     if isinstance(call.by, Solve):
-        return call.by.given
-    return call.by is None and not call.adds and len(call.writes) == 1 and list_of(call.writes[0]).kept is Kept.WORK
+        return call.by.gives_results
+    return (
+        call.by is None
+        and not call.adds
+        and len(call.writes) == 1
+        and list_of(call.writes[0]).storage is ListStorage.WORK
+    )
 
 
 def index_of(place: str) -> str:
@@ -614,7 +619,7 @@ def unrolled(passes: Iterable[Pass], signs: Sequence[int]) -> Iterator[tuple[Cal
 
 def check(passes: Iterable[Pass], programs: Mapping[str, Program], blocks: Blocks) -> None:
     """Raise AssertionError where a place does not fit its program, or nothing has written what a program reads."""
-    known = {name for name, one in LISTS.items() if one.given}
+    known = {name for name, one in LISTS.items() if one.is_input}
     every = ((call, programs[name]) for call in calls_of(passes) for name in call.programs)
     for call, program in every:
         assert program.output is not None

@@ -93,9 +93,9 @@ def lower_wrench(b: Blocks) -> Program:
     body: Symbols = p.read(b.body, "b")
     force: Symbols = p.read(b.force, "f")
     moment: Symbols = p.read(b.moment, "m")
-    held: Symbols = p.read(b.moment, "h")
+    lock_moment: Symbols = p.read(b.moment, "h")
     arm = p.let_vector(subtract(body["C"], frame["C"]), "arm")
-    total = add(add(moment["M"], held["M"]), cross(arm, force["F"]))
+    total = add(add(moment["M"], lock_moment["M"]), cross(arm, force["F"]))
     p.write(b.end_wrench, {"F": force["F"], "M": total})
     return p
 

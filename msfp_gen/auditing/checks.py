@@ -98,9 +98,9 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True)
 class AuditCase:
-    """What a check reads: histories as given, the data of the bearing, and histories with units and signs put right."""
+    """What a check reads: histories as read, the data of the bearing, and histories with units and signs put right."""
 
-    given: Histories
+    uncorrected: Histories
     stated: Stated
     data: Histories
     corrections: dict[str, Answer]
@@ -118,7 +118,7 @@ class AuditCase:
     @property
     def mass(self) -> float | None:
         """Mass that all bearings support, as stated [kg]; None: it is not stated."""
-        return stated_mass(self.given, self.stated)
+        return stated_mass(self.uncorrected, self.stated)
 
     @cached_property
     def shear_ratio(self) -> Array:

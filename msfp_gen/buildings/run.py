@@ -13,7 +13,7 @@ import numpy as np
 
 from msfp_gen.buildings.extremes import BuildingExtremes, lift_of, padded, temperature_of, vectors
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.scene import Asked, BuildingScene
+from msfp_gen.buildings.scene import BuildingScene, EffectRequest
 from msfp_gen.buildings.spectra import Steps
 from msfp_gen.buildings.storey import FREEDOMS
 from msfp_gen.common.arrays import Array, parts
@@ -73,11 +73,11 @@ KEPT = (*OF_SURFACES, *STORED, "work")
 class Member:
     """A bearing in a run.
 
-    asked: input that decides its effects. effects: of its model. rest: the scene of the bearing at rest between its
+    request: input that decides its effects. effects: of its model. rest: the scene of the bearing at rest between its
     ends. port: the two-port that the run steps.
     """
 
-    asked: Asked
+    request: EffectRequest
     effects: Effects
     rest: Scene
     model: Model
@@ -87,13 +87,13 @@ class Member:
     def of(cls, scene: BuildingScene, index: int, effects: Effects) -> Self:
         """A bearing of a building at rest, from 0, with a model of these effects. Raises InputError."""
         mount, load, solver = scene.bearings[index], float(scene.axial_loads[index]), scene.solver
-        asked = Asked(Auto() if mount.effects is None else mount.effects, solver, scene.end)
+        request = EffectRequest(Auto() if mount.effects is None else mount.effects, solver, scene.end)
         with prefixed(f"scene.bearings[{index}]: "):
             rest = scene_at_rest(mount.bearing, mount.interface, load, effects, solver)
         model = build_model(mount.bearing.layout, rest.modelled)
-        stops = stopping_monitors(asked, effects, strict=False)
+        stops = stopping_monitors(request, effects, strict=False)
         options = monitor_options(rest, effects, scene.effect_selections[index], stops, noted=("uplift",))
-        return cls(asked, effects, rest, model, compiled_port(rest, model, load, **options))
+        return cls(request, effects, rest, model, compiled_port(rest, model, load, **options))
 
     @property
     def shapes(self) -> list[tuple[str, tuple[int, ...]]]:
@@ -264,7 +264,7 @@ class BuildingRun:
         for index in own:
             member = self.members[index]
             ending = member.ending(status, surface, value)
-            after = next_effects(member.asked, ending)
+            after = next_effects(member.request, ending)
             if after is None or after == member.effects:
                 continue
             values = {f.name: (getattr(member.effects, f.name), getattr(after, f.name)) for f in fields(after)}

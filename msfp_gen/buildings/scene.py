@@ -92,7 +92,7 @@ def standing_below(mount: BuildingBearing, load: float) -> tuple[float, float, f
     return mount.interface.rotational_stiffness, needed_rotational_stiffness(mount.bearing, weight, 0.0), weight
 
 
-class Asked(NamedTuple):
+class EffectRequest(NamedTuple):
     """The input that decides the effects of a bearing: see `effect_switching.Requested`."""
 
     effects: Effects | Auto
@@ -409,7 +409,7 @@ class BuildingScene(Printed, OtherSystem):
         """The scene with every effect that monitors may add to its bearings; those with given effects stay."""
         bearings = []
         for mount, effects in zip(self.bearings, self.modelled, strict=True):
-            requested = Asked(Auto() if mount.effects is None else mount.effects, self.solver, self.end)
+            requested = EffectRequest(Auto() if mount.effects is None else mount.effects, self.solver, self.end)
             bearings.append(replace(mount, effects=with_monitored(requested, effects)))
         return (
             self

@@ -183,7 +183,7 @@ def runtime_sources(spec: ModelSpec) -> dict[str, str]:
     Names are unique across the folders, so that generated sources lie in one folder.
     """
     effects = spec.effects
-    asked = {  # a file, or all of a folder
+    needed = {  # a file, or all of a folder
         "gradients": spec.gradients,
         "port": effects.permits_moving_ends,
         "port.h": True,
@@ -192,7 +192,7 @@ def runtime_sources(spec: ModelSpec) -> dict[str, str]:
         "memory.c": effects.law is not None and effects.law.memory is not None,
         "contact_unilateral.c": effects.uplift,
     }
-    files = (path for path in _runtime() if asked.get(path.name, asked.get(path.parent.name, True)))
+    files = (path for path in _runtime() if needed.get(path.name, needed.get(path.parent.name, True)))
     return {path.name: path.read_text(encoding="utf-8") for path in files}
 
 

@@ -281,11 +281,11 @@ class Bearing(Printed):
             for index, value in enumerate(values):
                 with errors_at(type(items[index]).__name__.lower(), f"bearing.{list_of[column]}[{index}]"):
                     items[index] = dataclass_replace(items[index], **{column: value})
-        made = dataclass_replace(
+        changed = dataclass_replace(
             base, surfaces=rows["surfaces"], bodies=rows["bodies"], friction_at=friction_at, **bounds
         )
-        object.__setattr__(made, "_given_at", kept)
-        return made
+        object.__setattr__(changed, "_given_at", kept)
+        return changed
 
     @property
     def friction_given_at(self) -> str:

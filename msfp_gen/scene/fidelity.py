@@ -261,8 +261,8 @@ def _level(scene: Scene, bearing: Bearing) -> Top:
     load = getattr(top, "axial_load", 0.0)
     if isinstance(top, MassTop):
         load, lever = top.mass * bearing.gravity, lever + top.height
-    held: Top = replace(top, rotational_stiffness=max(top.rotational_stiffness, LEVEL * load * lever))
-    return held
+    level_top: Top = replace(top, rotational_stiffness=max(top.rotational_stiffness, LEVEL * load * lever))
+    return level_top
 
 
 def lively_end(motion: Motion, end: float) -> float:

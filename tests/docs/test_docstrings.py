@@ -1,4 +1,4 @@
-"""Public docstrings of arrays state shape and unit: of what functions and properties return, and of attributes."""
+"""Public docstrings state shape and unit of arrays that functions return, and of attributes; private ones are short."""
 
 from __future__ import annotations
 
@@ -104,3 +104,24 @@ def test_arrays_have_a_shape_and_a_unit() -> None:
             for name in unstated(path.read_text(encoding="utf-8"))
         ]
         assert not missing, missing
+
+
+def private_functions(node: ast.AST, inside: bool = False) -> Iterator[ast.FunctionDef]:
+    """Functions with an underscore, and those in functions."""
+    for item in ast.iter_child_nodes(node):
+        is_function = isinstance(item, ast.FunctionDef)
+        if is_function and (inside or (not public(item.name) and not item.name.startswith("__"))):
+            yield item
+        yield from private_functions(item, inside or is_function)
+
+
+def test_docstrings_of_private_functions_are_one_line() -> None:
+    long = [
+        f"{path.relative_to(ROOT)}:{function.lineno}: {function.name}"
+        for path in (*SOURCES, *sorted((ROOT / "generator").glob("*.py")))
+        for function in private_functions(ast.parse(path.read_text(encoding="utf-8")))
+        if "\n" in (ast.get_docstring(function) or "")
+    ]
+    assert not long, long
+    text = "class A:\n    def _inner(self):\n        '''One.\n\n        Two.\n        '''\n"
+    assert [function.name for function in private_functions(ast.parse(text))] == ["_inner"]

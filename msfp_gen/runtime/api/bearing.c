@@ -81,11 +81,11 @@ int msfp_api_bearing_new(double gravity, const double *bodies, const double *sur
     const int status = msfp_check_bearing(gravity, bodies, surfaces, top ? top : none, message);
     if (status)
         return status;
-    msfp_bearing *made = malloc(sizeof *made);
-    if (!made)
+    msfp_bearing *new_bearing = malloc(sizeof *new_bearing);
+    if (!new_bearing)
         return MSFP_E_MEMORY;
-    msfp_set_parameters(&made->parameters, gravity, bodies, surfaces, top ? top : none);
-    *bearing = made;
+    msfp_set_parameters(&new_bearing->parameters, gravity, bodies, surfaces, top ? top : none);
+    *bearing = new_bearing;
     return MSFP_OK;
 }
 

@@ -80,21 +80,21 @@ int msfp_api_run_new(const msfp_scene *scene, msfp_run **run, const char **messa
     const int wrong = msfp_check_scene(scene, message);
     if (wrong)
         return wrong;
-    msfp_run *made = calloc(1, sizeof *made);
-    if (!made)
+    msfp_run *new_run = calloc(1, sizeof *new_run);
+    if (!new_run)
         return MSFP_E_MEMORY;
     const msfp_history motion = history_of(&scene->motion), load = history_of(&scene->load),
                        support = history_of(&scene->support);
     const msfp_options options = msfp_scene_options(scene);
     const double *q = scene->q ? scene->q : zero, *v = scene->v ? scene->v : zero, *f = scene->f ? scene->f : zero;
-    msfp_run_start(made, &scene->bearing->parameters, &motion, &load, &support, scene->jumps, scene->jump_count,
+    msfp_run_start(new_run, &scene->bearing->parameters, &motion, &load, &support, scene->jumps, scene->jump_count,
                    &options, q, v, f);
     if (scene->monitor_heat)
-        memcpy(made->monitor.heat, scene->monitor_heat, sizeof made->monitor.heat);
-    made->options.origin = made->options.foot = made->options.memory = NULL; /* need not outlive this call */
-    made->identity = msfp_identity(scene);
-    *run = made;
-    return made->status;
+        memcpy(new_run->monitor.heat, scene->monitor_heat, sizeof new_run->monitor.heat);
+    new_run->options.origin = new_run->options.foot = new_run->options.memory = NULL; /* need not outlive this call */
+    new_run->identity = msfp_identity(scene);
+    *run = new_run;
+    return new_run->status;
 }
 
 void msfp_api_run_free(msfp_run *run)

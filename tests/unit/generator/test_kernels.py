@@ -17,7 +17,7 @@ from msfp_gen import Effects, Layout
 from msfp_gen.generator import generate
 from msfp_gen.generator.derive import Equations, derive
 from msfp_gen.generator.lower import GRADIENT_COLUMNS
-from msfp_gen.generator.schedule import at_hand, beside, calls_of, passes_of
+from msfp_gen.generator.schedule import beside, calls_of, output_is_stored, passes_of
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.specification.layout import ModelSpec
@@ -41,8 +41,8 @@ class Kernels:
             blocks = [use.alias for use in program.inputs]
             source += self._wrapped(program.name, [*blocks, "out"])
             if spec.gradients and program.name in alone:
-                output_is_stored = ["out"] if at_hand(alone[program.name]) else []
-                moved = [*blocks, *output_is_stored, *(f"d{name}" for name in [*blocks, *output_is_stored]), "dout"]
+                stored = ["out"] if output_is_stored(alone[program.name]) else []
+                moved = [*blocks, *stored, *(f"d{name}" for name in [*blocks, *stored]), "dout"]
                 source += self._wrapped(f"{program.name}_direction", moved)
         for name, content in (runtime_sources(spec) | generate(spec).files | {"kernels.c": source}).items():
             (folder / name).write_text(content, encoding="utf-8")
