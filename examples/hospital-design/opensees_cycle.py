@@ -1,6 +1,6 @@
 """The loop of a triple pendulum by the element TripleFrictionPendulum of OpenSees, for design.py.
 
-OpenSeesPy (`pip install msfp-gen[opensees]`) is for research and education only; design.py leaves the line out without
+OpenSeesPy (`pip install openseespy`) is for research and education only; design.py leaves the line out without
 it. OpenSees keeps its model in the process.
 """
 
