@@ -12,6 +12,7 @@ from typing import Annotated, Any
 from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
 from msfp_gen.buildings.storey import BaseSlab, Soil, Storey
+from msfp_gen.common.aliases import SceneTable
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, errors_at
 from msfp_gen.common.identity import fingerprint
@@ -32,7 +33,6 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import Kind
 from msfp_gen.scene.top import NodeTop
 
-Table = dict[str, Any]
 COMMON = ("interface", "soil", "effects")  # tables of [building] for all bearings that have none of their own
 
 
@@ -78,7 +78,7 @@ def _any(value: Any, *, text: bool) -> Any:
     return value
 
 
-def _tables(value: Any, *, text: bool) -> Table:
+def _tables(value: Any, *, text: bool) -> SceneTable:
     """The table `[bearings]`, whose tables are read by name."""
     if not isinstance(value, Mapping):
         raise ValueError("give a table")
@@ -130,7 +130,7 @@ def building_from_table(
     return scene
 
 
-def with_single_bearings(frame: Table) -> Table:
+def with_single_bearings(frame: SceneTable) -> SceneTable:
     """The table `[building]` with a row for each bearing of a grid, along x first; rows of no valid grid stay.
 
     Bearings have the names of the grid, A1, B1, ..., A2, ..., after the `name` of its row. Raises InputError.
@@ -163,7 +163,7 @@ def _letters(index: int) -> str:
     return (_letters(before - 1) if before else "") + chr(ord("A") + last)
 
 
-def _building(table: Table, folder: Path | None) -> Building:
+def _building(table: SceneTable, folder: Path | None) -> Building:
     """The building of the table `[building]`; a cache has the last buildings, by their frame or matrices."""
     frame = {name: value for name, value in table.items() if name not in (*COMMON, "bearing")}
     named = [name for name in MATRICES if name in frame]
@@ -175,8 +175,8 @@ def _building(table: Table, folder: Path | None) -> Building:
     return _of_table(frame, named)
 
 
-def _of_table(table: Table, files: list[str]) -> Building:
-    options: Table = {name: table[name] for name in ("damping_ratio", "rayleigh_frequencies") if name in table}
+def _of_table(table: SceneTable, files: list[str]) -> Building:
+    options: SceneTable = {name: table[name] for name in ("damping_ratio", "rayleigh_frequencies") if name in table}
     frames = [name for name in ("base", "storey") if table.get(name)]
     if files and frames:
         raise InputError(f"building.{frames[0]}: not together with building.{files[0]}; give a frame or its matrices")
@@ -184,7 +184,7 @@ def _of_table(table: Table, files: list[str]) -> Building:
     return building.reduced(table["highest_frequency"]) if "highest_frequency" in table else building
 
 
-def _of_storeys(table: Table, options: Table) -> Building:
+def _of_storeys(table: SceneTable, options: SceneTable) -> Building:
     if "base" not in table:
         raise InputError("building.base is missing: give this table, or mass and stiffness as files of matrices")
     if table.get("node"):
@@ -198,7 +198,7 @@ def _of_storeys(table: Table, options: Table) -> Building:
     return Building.shear(base, storeys, **options)
 
 
-def _of_matrices(table: Table, options: Table) -> Building:
+def _of_matrices(table: SceneTable, options: SceneTable) -> Building:
     for name in MATRICES[:2]:
         if name not in table:
             raise InputError(f"building.{name} is missing: give the path of a .mtx or .npz file")
@@ -211,13 +211,15 @@ def _of_matrices(table: Table, options: Table) -> Building:
     return Building.from_matrices(**files, nodes=nodes, **options)  # type: ignore[arg-type]
 
 
-def stored_bearing(row: Table, index: int) -> BuildingBearing:
+def stored_bearing(row: SceneTable, index: int) -> BuildingBearing:
     """A bearing from a complete table of a result file, in SI units. Raises InputError."""
     path = f"bearing[{index}]"
     return _bearing(validate(_STORED, row), path, {}, None, {})
 
 
-def _bearing(row: Table, path: str, named: Table, folder: Path | None, bearings: dict[str, Bearing]) -> BuildingBearing:
+def _bearing(
+    row: SceneTable, path: str, named: SceneTable, folder: Path | None, bearings: dict[str, Bearing]
+) -> BuildingBearing:
     """A bearing from the table `[[building.bearing]]` at `path`. named, bearings: as of `_bearing_values`."""
     values = dict(row)
     if "interface" not in values:
@@ -238,7 +240,7 @@ def _bearing(row: Table, path: str, named: Table, folder: Path | None, bearings:
         return BuildingBearing(**values)
 
 
-def _bearing_values(source: Any, path: str, named: Table, bearings: dict[str, Bearing]) -> Bearing:
+def _bearing_values(source: Any, path: str, named: SceneTable, bearings: dict[str, Bearing]) -> Bearing:
     """The values of a bearing. source: name in `[bearings]` or of a preset, or a table. Raises InputError."""
     # named: the table `[bearings]`. bearings: name -> values that are read already; receives further ones.
     in_file = isinstance(source, str) and source in named
@@ -256,7 +258,7 @@ def _bearing_values(source: Any, path: str, named: Table, bearings: dict[str, Be
     return bearing
 
 
-def _with_files(table: Mapping[str, Any]) -> Iterator[tuple[str, Table, tuple[str, ...]]]:
+def _with_files(table: Mapping[str, Any]) -> Iterator[tuple[str, SceneTable, tuple[str, ...]]]:
     """Place, table and keys of the matrices of `[building]`, and of the motions of single bearings."""
     frame = table["building"]
     if not isinstance(frame, dict):

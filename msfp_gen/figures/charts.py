@@ -167,7 +167,6 @@ def _note_end(axes: Axes, raw: Array, unit: str) -> None:
     )
 
 
-Table = Mapping[str, Mapping[str, ArrayLike]]
 COSTS = {"seconds": "seconds of wall time", "newton": "Newton iterations"}
 FLAGS = ("failed", "wrong", "cut")
 MARKERS = "osD^vP*X<>"
@@ -175,7 +174,7 @@ TOP = 0.965  # height of the markers of runs without a known error, over the hei
 
 
 def plot_work_precision(
-    table: Table,
+    table: Mapping[str, Mapping[str, ArrayLike]],
     path: str | Path | None = None,
     *,
     errors: Mapping[str, str] | None = None,
@@ -233,7 +232,7 @@ def _mark(axes: Axes, marks: Mapping[str, tuple[float | None, float | None]]) ->
             axes.annotate(label, (cost, error), xytext=(10, 8), textcoords="offset points", color=INK, bbox=BLANK)
 
 
-def _checked(table: Table) -> dict[str, dict[str, Array]]:
+def _checked(table: Mapping[str, Mapping[str, ArrayLike]]) -> dict[str, dict[str, Array]]:
     """The table as arrays. Raises InputError that names a method whose columns differ in length."""
     if not table:
         raise InputError("table is empty: give at least one method with its columns")

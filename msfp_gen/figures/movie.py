@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import check_output, replacing
@@ -58,7 +59,7 @@ def animate(
     start: float | None = None,
     end: float | None = None,
     azimuth: float | None = None,
-    progress: Callable[[float, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Path:
     """Write a movie of a run.
 
@@ -202,7 +203,7 @@ def even(height: float) -> float:
     return 2 * round(height * DOTS / 2) / DOTS
 
 
-def pictures(figure: Figure, film: Film, progress: Callable[[float, float], None] | None) -> Iterator[Array]:
+def pictures(figure: Figure, film: Film, progress: Progress | None) -> Iterator[Array]:
     """The frames as pixels, shape (height, width, 4) [-]: what stands still is drawn once, the rest over a copy."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 

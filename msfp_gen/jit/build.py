@@ -26,7 +26,7 @@ import re
 import shutil
 import threading
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache as remember
 from importlib import resources
@@ -37,13 +37,13 @@ from time import perf_counter
 from types import ModuleType
 from typing import Any
 
+from msfp_gen.common.aliases import BuildProgress
 from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.tables import Table
 from msfp_gen.jit import cache
 from msfp_gen.jit.compiler import CFLAGS, COMPILER, EXTENSION_SUFFIX, LOG_NAME, compile_extension, words, x86_64_level
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
-Progress = Callable[[str, float], None]
 ENTRY = "msfp_entry.c"
 _INCLUDE = re.compile(r'(?:#include|cdef extern from) "([\w.]+)"')
 GENERATION_SHARE = 0.13  # of the build time, for the progress display; compilation takes the rest
@@ -81,7 +81,7 @@ class BuildInfo:
     key: str = ""
 
 
-def prepare(spec: ModelSpec, progress: Progress | None = None, portable: bool = False) -> BuildInfo:
+def prepare(spec: ModelSpec, progress: BuildProgress | None = None, portable: bool = False) -> BuildInfo:
     """Build the model unless the wheel or the cache holds it; the extension is not imported.
 
     Args:
@@ -103,7 +103,7 @@ def prepare(spec: ModelSpec, progress: Progress | None = None, portable: bool = 
     return _info(spec, manifest, entry.folder, entry.identity, not built, perf_counter() - begin)
 
 
-def load(spec: ModelSpec, progress: Progress | None = None) -> tuple[ModuleType, BuildInfo]:
+def load(spec: ModelSpec, progress: BuildProgress | None = None) -> tuple[ModuleType, BuildInfo]:
     """Import the compiled module of a model, after building it if necessary; arguments and errors as of `prepare`."""
     begin = perf_counter()
     info = prepare(spec, progress)
@@ -111,7 +111,7 @@ def load(spec: ModelSpec, progress: Progress | None = None) -> tuple[ModuleType,
     return extension, replace(info, seconds=perf_counter() - begin)
 
 
-def generate_to(spec: ModelSpec, folder: Path | str, progress: Progress | None = None) -> BuildInfo:
+def generate_to(spec: ModelSpec, folder: Path | str, progress: BuildProgress | None = None) -> BuildInfo:
     """Write the sources and the compiled module of a model into `folder`, for a plain `import msfp_5_2_2`.
 
     The module runs on every processor of this architecture. Its sources are in two folders, `derived` and `runtime`:
@@ -263,7 +263,7 @@ def _info(spec: ModelSpec, manifest: cache.Manifest, folder: Path, key: str, cac
     )
 
 
-def _build(spec: ModelSpec, entry: cache.Entry, folder: Path, notify: Progress) -> cache.Manifest:
+def _build(spec: ModelSpec, entry: cache.Entry, folder: Path, notify: BuildProgress) -> cache.Manifest:
     """Derive, lower, emit and compile a model into `folder`, and write its manifest."""
     from msfp_gen.generator import generate
 

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from msfp_gen.common.aliases import BuildProgress
 from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.errors import InputError, RunError
-from msfp_gen.jit.build import BuildInfo, Progress, load
+from msfp_gen.jit.build import BuildInfo, load
 from msfp_gen.model.compiled import (
     FAILURES,
     Evaluation,
@@ -454,7 +455,7 @@ class Model:
 
 
 def build_model(
-    layout: Layout, effects: Effects | None = None, gradients: bool = False, *, progress: Progress | None = None
+    layout: Layout, effects: Effects | None = None, gradients: bool = False, *, progress: BuildProgress | None = None
 ) -> Model:
     """The compiled model of a layout: derived, emitted and compiled once, then imported from the cache.
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import G
@@ -26,7 +27,7 @@ from msfp_gen.figures.style import CASE_COLOURS, COLOURS, FAINT, INK, THIN, dist
 from msfp_gen.report.compared import compared_table
 from msfp_gen.report.frames import picture, render, write_page
 from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of, terms_shown
-from msfp_gen.report.repeated import Proceed, plot_loops, plot_vertical, repeat_words, repeated, vertical_table
+from msfp_gen.report.repeated import plot_loops, plot_vertical, repeat_words, repeated, vertical_table
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.sheet import Sheet
@@ -77,7 +78,7 @@ def write_analysis(
     leave_out: Collection[str] = (),
     *,
     loops: bool = True,
-    progress: Proceed | None = None,
+    progress: Progress | None = None,
 ) -> Path:
     """Write the report of a suite at bounds; the file appears only when complete, and loads no other file.
 
@@ -101,7 +102,7 @@ def analysis_html(
     leave_out: Collection[str] = (),
     *,
     loops: bool = True,
-    progress: Proceed | None = None,
+    progress: Progress | None = None,
 ) -> str:
     """The report of a suite at bounds as text; arguments and errors as of `write_analysis`."""
     from msfp_gen.studies.assessment.rows import read_study
@@ -169,7 +170,7 @@ def _sections(study: Study, bounds: SuiteBounds, rows: Any, scene: Any) -> Itera
     yield _part_section(bounds, "Uplift", UPLIFT)
 
 
-def _runs_again(study: Study, bounds: SuiteBounds, rows: Any, progress: Proceed | None) -> Iterator[Section]:
+def _runs_again(study: Study, bounds: SuiteBounds, rows: Any, progress: Progress | None) -> Iterator[Section]:
     """Loops of the runs with the largest displacements, and what the vertical component does to them."""
     runs = repeated(study, bounds, rows, progress)
     if not runs:

@@ -6,7 +6,7 @@ A problem is one scene as a packed array of numbers, and what the page needs to 
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,6 +14,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.figures.style import colour
@@ -154,7 +155,6 @@ def _packed(values: Any) -> str:
     return base64.b64encode(np.ascontiguousarray(values, dtype="<f8").tobytes()).decode("ascii")
 
 
-Progress = Callable[[float, float], None]
 # Presets of a page without a scene of the user's: laboratory tests, orbits, other devices, and a bundled record.
 EXPLORED = (
     "fenz-test2", "fenz-test5", "becker-circle-88", "becker-eight-88", "unusual-tfp", "double-push", "quintuple-push",

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.tables import Table
 from msfp_gen.common.version import __version__
@@ -152,7 +153,6 @@ def _event_table(events: Sequence[Event]) -> Table:
 
 
 NO_TITLE = TitleBlock()
-Progress = Callable[[float, float], None]
 SCRIPTS = ("three.min.js", "dom.js", "canvas.js", "data.js", "chart.js")  # of every page, before its own
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 5, 10)
 

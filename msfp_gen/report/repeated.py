@@ -6,13 +6,14 @@ without its vertical component; all quantities of the former are compared with i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import RunError
 from msfp_gen.common.tables import Table
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
 
     from msfp_gen.studies.definition import Study
 
-Proceed = Callable[[float, float], None]
 # Quantities that are compared with and without the vertical component, where the runs have them.
 COMPARED = (
     "peak_displacement", "peak_force", "peak_overturning_moment", "peak_floor_acceleration", "peak_corner_acceleration",
@@ -70,7 +70,7 @@ class Repeated:
     compared: int
 
 
-def repeated(study: Study, bounds: SuiteBounds, rows: Any, progress: Proceed | None = None) -> list[Repeated]:
+def repeated(study: Study, bounds: SuiteBounds, rows: Any, progress: Progress | None = None) -> list[Repeated]:
     """The runs with the largest displacement at each bound, of those that reached their end, made again."""
     chosen = []
     for case in CASES:

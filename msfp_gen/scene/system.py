@@ -13,6 +13,7 @@ from functools import cache
 from importlib.resources.abc import Traversable
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
+from msfp_gen.common.aliases import SceneTable
 from msfp_gen.common.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from msfp_gen.specification.friction_laws import Law
     from msfp_gen.specification.layout import Effects, ModelSpec
 
-Table = dict[str, Any]
 GROUP = "msfp_gen.systems"  # of entry points; the name of each is the `key` of its kind
 
 
@@ -205,11 +205,11 @@ class Kind:
 
     key: str
     from_table: Callable[..., Any]
-    files: Callable[[Mapping[str, Any]], Iterator[tuple[str, Table, tuple[str, ...]]]]
+    files: Callable[[Mapping[str, Any]], Iterator[tuple[str, SceneTable, tuple[str, ...]]]]
     common: tuple[str, ...] = ()
     presets: Traversable | None = None
     result: Callable[[], Any] | None = None
-    written_out: Callable[[Table], Table] = lambda table: table
+    written_out: Callable[[SceneTable], SceneTable] = lambda table: table
 
 
 def is_system(value: object) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import reduce
 from operator import or_
 
@@ -29,8 +29,6 @@ from msfp_gen.simulation.rows import Segment
 from msfp_gen.specification.contract import STATUSES
 from msfp_gen.specification.friction_laws import is_plastic
 from msfp_gen.specification.layout import Auto, Effects
-
-Progress = Callable[[float, float], None]  # called with the time reached and the end of the run [s]
 
 
 def extremes_of(segments: Sequence[Segment]) -> Extremes | None:

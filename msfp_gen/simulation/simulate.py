@@ -7,6 +7,7 @@ from functools import singledispatch
 from pathlib import Path
 from typing import Any, overload
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_switching import check
@@ -14,7 +15,6 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import System, is_system
 from msfp_gen.simulation.bearing_run import start_bearing
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity
-from msfp_gen.simulation.outcome import Progress
 from msfp_gen.simulation.system import Run, finish
 
 

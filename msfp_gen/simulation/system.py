@@ -8,8 +8,8 @@ from __future__ import annotations
 import time
 from typing import Any, Protocol
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.simulation.checkpoint import Checkpoint
-from msfp_gen.simulation.outcome import Progress
 
 
 class Run(Protocol):

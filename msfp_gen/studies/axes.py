@@ -16,6 +16,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from msfp_gen.common.aliases import SceneTable
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Choice, Quantity, check_fields
@@ -207,7 +208,6 @@ def number_of(table: Mapping[str, Any], name: str) -> float:
         raise InputError(f"{name} = {table[name]!r}: {error}; in SI units") from None
 
 
-Table = dict[str, Any]
 KEYS = ("sets", "multiplies", "factors", "surfaces", "values", "labels", "range", "points", "spacing", "distribution")
 RESERVED = ("run", "status", "message")
 SPACINGS = ("linear", "log")
@@ -374,9 +374,9 @@ class StudyInputs:
         intensities: name of a record -> intensity measure at scale 1 [m/s^2]; empty for a study without intensity.
     """
 
-    scene: Table
+    scene: SceneTable
     axes: tuple[Axis, ...]
-    records: dict[str, Table]
+    records: dict[str, SceneTable]
     factors: dict[str, FactorTable]
     intensities: dict[str, float]
 
@@ -387,7 +387,7 @@ class StudyInputs:
         return {INTENSITY: self.intensities[at["record"]] * at.get("scale", 1.0)}
 
 
-def motion_of(record: Table) -> Table:
+def motion_of(record: SceneTable) -> SceneTable:
     """The `[motion]` table of a scene that runs a record."""
     return {"kind": RecordMotion.kind, **record}
 
@@ -460,7 +460,7 @@ class SceneFactory:
             "of bearings out, or vary them by their paths"
         )
 
-    def _scaled(self, name: str, factor: float) -> Table:
+    def _scaled(self, name: str, factor: float) -> SceneTable:
         """The `[motion]` table of a record times a factor."""
         table = self.inputs.records[name]
         if not factor > 0:

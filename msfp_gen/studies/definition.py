@@ -6,7 +6,7 @@ any run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from msfp_gen.common.aliases import Progress, SceneTable
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Choice, Quantity, check_fields, ruled_fields
@@ -47,8 +48,6 @@ from msfp_gen.studies.columns import Keep, usual_names
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
 
-Table = dict[str, Any]
-Progress = Callable[[float, float], None]
 MOST_RUNS = 100_000_000
 
 TRIED = 1000  # numbers of one axis that are tried before the first run, at least; texts and tables are all tried
@@ -346,7 +345,7 @@ class Intensity:
 
 def _records(
     table: Any, folder: Path | None, progress: Progress | None
-) -> tuple[list[Axis], dict[str, Table], dict[str, float], Table]:
+) -> tuple[list[Axis], dict[str, SceneTable], dict[str, float], SceneTable]:
     """Read a table `[records]`. folder: of the study file. Raises InputError."""
     # Returns four values, all empty for None: the axes `record` and, with scales, `scale`; name -> `[motion]` table
     # of a record, without the key `kind`, with absolute paths; name -> intensity measure at scale 1 [m/s^2], empty
@@ -469,14 +468,14 @@ def _checked_study(table: Mapping[str, Any], folder: Path | None, progress: Prog
     )
 
 
-def _axis_table(axis: Axis, table: Table) -> Table:
+def _axis_table(axis: Axis, table: SceneTable) -> SceneTable:
     """The table of an axis for the copy of the study: values with absolute paths, labels as the study file has them."""
     if axis.values is None or list(axis.values) == table.get("values"):
         return table
     return {**table, "values": list(axis.values), "labels": list(axis.labels)} if "values" in table else table
 
 
-def _table(table: Mapping[str, Any], key: str) -> Table:
+def _table(table: Mapping[str, Any], key: str) -> SceneTable:
     """The table at a key of a study file; empty without the key. Raises InputError."""
     value = table.get(key, {})
     if not isinstance(value, Mapping):
@@ -484,7 +483,7 @@ def _table(table: Mapping[str, Any], key: str) -> Table:
     return dict(value)
 
 
-def _scene(value: Any, folder: Path | None) -> Table:
+def _scene(value: Any, folder: Path | None) -> SceneTable:
     """The table of the base scene, with absolute paths, from the value of the key `scene`."""
     if isinstance(value, str):
         table, path = scene_table(_beside(value, folder))

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Files, expecting
@@ -48,7 +49,6 @@ from msfp_gen.studies.workers import Pool, pool_from
 if TYPE_CHECKING:
     from msfp_gen.scene.system import System
 
-Progress = Callable[[int, int], None]
 FORMAT = 1  # version of the format of a part
 STUDY_FILE = "study.toml"
 PARTS = "part-*.parquet"

@@ -12,7 +12,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import positive
 from msfp_gen.motions.records import cosmos, csmip, csv_table, headerless, knet, peer
 from msfp_gen.motions.records.correction import Corrected, baseline_corrected, strong_window, uncorrected
-from msfp_gen.motions.records.csv_table import Table, read_table, write_csv
+from msfp_gen.motions.records.csv_table import RecordTable, read_table, write_csv
 from msfp_gen.motions.records.peer import read_peer
 from msfp_gen.motions.records.record import Channel, Record, assemble_record
 from msfp_gen.motions.records.scaling import ScaledSuite, ScaleTo, asce7_spectrum, prepared, scaled_suite
@@ -23,10 +23,10 @@ __all__ = [
     "BUNDLED",
     "Corrected",
     "Record",
+    "RecordTable",
     "ScaleTo",
     "ScaledSuite",
     "Spectrum",
-    "Table",
     "asce7_spectrum",
     "baseline_corrected",
     "bundled",

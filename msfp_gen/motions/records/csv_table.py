@@ -19,7 +19,7 @@ _QUANTITIES = {"a": ("acceleration", "m/s^2"), "v": ("velocity", "m/s"), "u": ("
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class RecordTable:
     """Times and three components of one quantity.
 
     Attributes:
@@ -46,7 +46,7 @@ def matches(lines: Lines) -> bool:
     return all(COLUMN.fullmatch(c) for c in first_line(lines)[1].split(","))
 
 
-def read_table(path: str | PathLike[str]) -> Table:
+def read_table(path: str | PathLike[str]) -> RecordTable:
     """Read a table of accelerations (a1, a2, a3), velocities (v1, ...) or displacements (u1, ...).
 
     Lines that begin with # are comments. Raises InputError that names file, line and reason.
@@ -94,7 +94,7 @@ def first_line(lines: Lines, header: str = "time [s], a1 [m/s^2], ...") -> tuple
     lines.fail(0, f"no header; begin with: {header}")
 
 
-def _table(lines: Lines) -> Table:
+def _table(lines: Lines) -> RecordTable:
     head, header = first_line(lines)
     names, units, factors = _columns(lines, head, header)
     rows, last, places = [], [], []
@@ -112,7 +112,7 @@ def _table(lines: Lines) -> Table:
     data = {name: column([row[i] for row in rows]) * factors[i] for i, name in enumerate(names)}
     letter = next(n[0] for n in names if n != "time")
     values, missing = common_window([data.get(f"{letter}{i}") for i in (1, 2, 3)])
-    return Table(
+    return RecordTable(
         stem(lines.path), _QUANTITIES[letter][0], data["time"], values, ", ".join(units), missing + notes, tuple(places)
     )
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, Text, check_fields, require_type, ruled_fields, to_si
@@ -19,7 +20,7 @@ from msfp_gen.motions.checks import finite, positive
 from msfp_gen.motions.records.correction import Corrected, baseline_corrected, uncorrected
 from msfp_gen.motions.records.csv_table import COLUMN, first_line
 from msfp_gen.motions.records.record import Record
-from msfp_gen.motions.records.spectrum import DAMPING, ContinuousMotion, Progress, measure_index, response_spectrum
+from msfp_gen.motions.records.spectrum import DAMPING, ContinuousMotion, measure_index, response_spectrum
 from msfp_gen.motions.records.text import read_lines
 
 _ACCELERATION = Quantity("m/s^2", above=0.0)

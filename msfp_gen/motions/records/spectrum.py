@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import check_output, replacing
@@ -20,7 +20,6 @@ from msfp_gen.motions.records.record import COMPONENTS, Record
 
 MEASURES = (*COMPONENTS, "geomean", "rotd50", "rotd100")
 DAMPING = 0.05
-Progress = Callable[[float, float], None]
 _RESOLUTION = 50  # points in a period: the largest value at them is less than 1 - cos(pi/50) = 0.2 % below the peak
 ROUNDING = 1e-9  # of the number of sample intervals in a motion
 _ANGLES = np.radians(np.arange(180.0))  # directions of RotDnn, Boore (2010)

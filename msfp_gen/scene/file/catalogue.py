@@ -10,28 +10,27 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
 
+from msfp_gen.common.aliases import SceneTable
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Rule
 from msfp_gen.scene.system import kinds
-
-Table = dict[str, Any]
 
 # Effects of a preset unless its table gives others: the complete model of PEER 2017/07.
 PRESET_EFFECTS = {"dimension": "spatial", "sliders": "inertial", "rims": True, "uplift": False}
 
 
-def bearing_table(name: str) -> Table:
+def bearing_table(name: str) -> SceneTable:
     """The bearing preset `name`, without its description; raises InputError for an unknown name."""
     return _find("bearing", name)
 
 
-def scene_table(name: str) -> Table:
+def scene_table(name: str) -> SceneTable:
     """The preset `name` of a scene of one bearing, complete, without its description; raises InputError without one."""
     table = _find("scene", name)
     return table | {"name": name, "effects": {**PRESET_EFFECTS, **table.get("effects", {})}}
 
 
-def preset_table(name: str) -> Table | None:
+def preset_table(name: str) -> SceneTable | None:
     """The complete table of a scene preset, of one bearing or of another kind; None: there is none of that name."""
     if name in _tables("scene"):
         return scene_table(name)
@@ -93,7 +92,7 @@ def parsed(rule: Rule, value: object, path: str) -> Any:
         raise InputError(f"{path} = {value!r}: {error}") from None
 
 
-def _find(word: str, name: str) -> Table:
+def _find(word: str, name: str) -> SceneTable:
     tables = _tables(word)
     if name not in tables:
         hint = suggestion(str(name), tables) or f"; the presets are {', '.join(tables)}"
@@ -102,7 +101,7 @@ def _find(word: str, name: str) -> Table:
 
 
 @cache
-def _tables(word: str) -> dict[str, Table]:
+def _tables(word: str) -> dict[str, SceneTable]:
     """Name -> table of each preset, by one of `words`. `[common]` lies under every table of its file."""
     if word not in ("bearing", "scene"):
         folder = kinds()[word].presets
@@ -111,7 +110,7 @@ def _tables(word: str) -> dict[str, Table]:
     return dict(_read(own, lambda name: (name == "bearings.toml") == (word == "bearing")))
 
 
-def _read(folder: Traversable, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Table]]:
+def _read(folder: Traversable, wanted: Callable[[str], bool]) -> Iterator[tuple[str, SceneTable]]:
     for path in sorted(folder.iterdir(), key=lambda path: path.name):
         if path.name.endswith(".toml") and wanted(path.name):
             tables = tomllib.loads(path.read_text(encoding="utf-8"))

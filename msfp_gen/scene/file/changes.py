@@ -8,6 +8,7 @@ from copy import copy, deepcopy
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from msfp_gen.common.aliases import SceneTable
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, ruled_fields
 from msfp_gen.scene.bearing import Body, Surface
@@ -15,7 +16,6 @@ from msfp_gen.scene.file.loader import MAX_DEPTH, complete_bearing, complete_par
 from msfp_gen.scene.file.schema import SCENE
 from msfp_gen.scene.system import kinds
 
-Table = dict[str, Any]
 Key = str | int | None  # of a table, of a list, of all rows of a list
 _STEP = re.compile(r"([^\[\].]+)((?:\[(?:\d+|\*)\])*)")
 _WITH_UNIT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([A-Za-z%°µ].*)")  # "75 mm"
@@ -39,14 +39,14 @@ class _Place(NamedTuple):
 class _Walk(NamedTuple):
     """How a table is walked: from its root; whether bearings are made complete; to which surfaces (from 1), or all."""
 
-    root: Table
+    root: SceneTable
     complete: bool = False
     surfaces: Collection[int] | None = None
 
 
 def changed_table(
     table: Mapping[str, Any], changes: Mapping[str, Any], surfaces: Collection[int] | None = None
-) -> Table:
+) -> SceneTable:
     """A copy of a table with the fields at some paths set; the schema checks afterwards that they exist.
 
     `[i]` in a path is a row of a list, from 0; `[*]` stands for all rows. A bearing that a preset gives, or the name of
@@ -66,7 +66,7 @@ def changed_table(
 
 def multiplied_table(
     table: Mapping[str, Any], path: str, factor: float, surfaces: Collection[int] | None = None
-) -> Table:
+) -> SceneTable:
     """A copy of a table with the numbers at a path multiplied; arguments and errors as of `changed_table`."""
     changed = dict(table)
     part = path.partition(".")[0]
@@ -128,7 +128,7 @@ def _is_kind(key: str) -> bool:
     return key not in SCENE.keys and key in kinds()
 
 
-def _column(walk: _Walk, bearing: Table, name: str) -> Iterator[_Place]:
+def _column(walk: _Walk, bearing: SceneTable, name: str) -> Iterator[_Place]:
     """The places of a field of the surfaces or bodies of a complete bearing."""
     rows = _COLUMNS[name][0]
     bearing[rows] = [dict(row) for row in bearing.get(rows, [])]

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.common.aliases import Progress, SceneTable
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import errors_at, ruled_fields
 from msfp_gen.common.identity import fingerprint
@@ -44,17 +45,16 @@ from msfp_gen.specification.layout import SELECTABLE, Auto, Effects, Layout
 if TYPE_CHECKING:
     from msfp_gen.motions.records import ScaledSuite
 
-Table = dict[str, Any]
 MAX_DEPTH = 16  # of nested tables and lists; a scene has six
 _TOO_DEEP = "no valid TOML: tables or lists are nested too deeply; a scene needs few levels"
 _TOPS = {kind.kind: kind for kind in (RigTop, PrescribedTop, MassTop)}
 Parts = Mapping[str, Any]
 NO_PARTS: Parts = MappingProxyType({})
-_complete: InputCache[Table] = InputCache(16, lambda _: 1)
+_complete: InputCache[SceneTable] = InputCache(16, lambda _: 1)
 _FIELDS_ALONE = {"solver": Solver, "initial_state": InitialState, "stop": Stop, "limits": Limits}
 
 
-def scene_table(source: str | Path) -> tuple[Table, Path | None]:
+def scene_table(source: str | Path) -> tuple[SceneTable, Path | None]:
     """The table of a scene file, not validated, and the path of the file; of a preset None.
 
     Raises InputError of one line that names the file, or the preset that does not exist.
@@ -70,7 +70,7 @@ def scene_table(source: str | Path) -> tuple[Table, Path | None]:
         return toml_file(path), path
 
 
-def toml_file(path: Path) -> Table:
+def toml_file(path: Path) -> SceneTable:
     """The table of a TOML file; raises InputError, without the path, where it cannot be read or is not valid."""
     try:
         return toml_table(read_input(path).decode("utf-8-sig"))
@@ -80,7 +80,7 @@ def toml_file(path: Path) -> Table:
         raise InputError(f"no UTF-8 text at byte {error.start}; save the file as UTF-8") from None
 
 
-def toml_table(text: str) -> Table:
+def toml_table(text: str) -> SceneTable:
     """The table of a TOML text; raises InputError where the text is not valid, or nested more deeply than any scene."""
     try:
         table = tomllib.loads(text)
@@ -111,7 +111,7 @@ def scene_from_table(table: Mapping[str, Any], folder: Path | None = None, parts
     return reduced
 
 
-def scene_parts(keys: schema.Keys, table: Mapping[str, Any], folder: Path | None, others: Parts) -> Table:
+def scene_parts(keys: schema.Keys, table: Mapping[str, Any], folder: Path | None, others: Parts) -> SceneTable:
     """The parts of a scene, of one bearing or of a building, by name.
 
     keys: of its file. others: those for which there are no tables. Other arguments and errors are those of
@@ -161,7 +161,7 @@ def parsed_sheet(table: Mapping[str, Any]) -> Sheet:
     return Sheet(**schema.validate_part("bearing", dict(table))["sheet"])
 
 
-def complete_bearing(table: Mapping[str, Any]) -> Table:
+def complete_bearing(table: Mapping[str, Any]) -> SceneTable:
     """A `[bearing]` table that states every surface and body, in SI units, of one that names a preset or is complete.
 
     Coefficients of friction stay those of the table, also where they are at the pivot. Raises InputError.
@@ -169,7 +169,7 @@ def complete_bearing(table: Mapping[str, Any]) -> Table:
     return dict(_complete.value(fingerprint(table), lambda: _completed(table)))
 
 
-def _completed(table: Mapping[str, Any]) -> Table:
+def _completed(table: Mapping[str, Any]) -> SceneTable:
     valid = schema.validate_part("bearing", table)
     at = _bearing(valid).friction_given_at if "sheet" in valid else valid.get("friction_at", "surface")
     if at == "surface":
@@ -178,7 +178,7 @@ def _completed(table: Mapping[str, Any]) -> Table:
     return {**plain_values(bearing_table(_bearing({**valid, "friction_at": "surface"}))), "friction_at": at}
 
 
-def complete_part(name: str, table: Mapping[str, Any]) -> Table:
+def complete_part(name: str, table: Mapping[str, Any]) -> SceneTable:
     """The table `[top]` or `[solver]` with all numbers, in SI units. Raises InputError."""
     valid = schema.validate_part(name, table)
     if name == "solver":
@@ -186,7 +186,7 @@ def complete_part(name: str, table: Mapping[str, Any]) -> Table:
     return {"kind": valid["kind"], **plain_values(plain_table(_top(valid)))}
 
 
-def bearing_table(bearing: Bearing) -> Table:
+def bearing_table(bearing: Bearing) -> SceneTable:
     """The complete `[bearing]` table of a bearing, in SI units."""
     return {
         "layout": plain_table(bearing.layout),
@@ -272,14 +272,14 @@ def _top(table: Mapping[str, Any]) -> Top:
     return _TOPS[table["kind"]](**{key: value for key, value in table.items() if key != "kind"})
 
 
-def _motion_table(scene: Scene) -> Table:
+def _motion_table(scene: Scene) -> SceneTable:
     """The `[motion]` table of the scene file if it still makes the scene's motion, else its polynomials."""
     if scene.motion_table is not None and motion_from(scene.motion_table) == scene.motion:
         return {"kind": scene.motion_table["kind"], **scene.motion_table}
     return Pieces.of(scene.motion)
 
 
-def plain_table(value: Any) -> Table:
+def plain_table(value: Any) -> SceneTable:
     """Fields of a part as a table. `top_rotation` is omitted: it follows from the table `[top_rotation]`."""
     names = [name for name, _, _ in ruled_fields(type(value)) if name != "top_rotation"]
     return {field.name: getattr(value, field.name) for field in fields(value) if field.name in names}
@@ -305,7 +305,7 @@ def plain_values(value: Any) -> Any:
 
 
 # Table of a scene file -> what makes the part of its validated values.
-_PARTS: dict[str, Callable[[Table], Any]] = {
+_PARTS: dict[str, Callable[[SceneTable], Any]] = {
     **{name: partial(_of_fields, kind) for name, kind in _FIELDS_ALONE.items()},
     "bearing": _bearing,
     "effects": effects_from_table,
@@ -320,7 +320,7 @@ class SuiteRecord:
     """A motion of a suite: its name, its `[motion]` table, from which a result file describes it, and the motion."""
 
     name: str
-    table: Table
+    table: SceneTable
     motion: Motion
 
 
@@ -330,10 +330,10 @@ class Suite:
 
     records: tuple[SuiteRecord, ...]
     scaled: ScaledSuite | None
-    target: Table | None = None
+    target: SceneTable | None = None
 
 
-def load_suite(path: str | Path, progress: Callable[[float, float], None] | None = None) -> Suite:
+def load_suite(path: str | Path, progress: Progress | None = None) -> Suite:
     """The suite in a TOML file; paths inside it are relative to it, and permitted as in a scene file.
 
     progress: called with the number of spectra computed and of all. Raises InputError of one line that names the file,
@@ -346,9 +346,7 @@ def load_suite(path: str | Path, progress: Callable[[float, float], None] | None
         return suite_from_table(toml_file(path), path.parent, progress)
 
 
-def suite_from_table(
-    table: Table, folder: Path | None, progress: Callable[[float, float], None] | None = None
-) -> Suite:
+def suite_from_table(table: SceneTable, folder: Path | None, progress: Progress | None = None) -> Suite:
     """The suite of a plain table, as in a suite file. folder: as of `scene_from_table`. Raises InputError."""
     valid = schema.validate_suite(table)
     if not valid["records"]:
@@ -358,13 +356,13 @@ def suite_from_table(
     return _suite(tables, target and with_spectrum(target, folder, "scale_to"), progress)
 
 
-def _located(table: Table, folder: Path | None, index: int) -> Table:
+def _located(table: SceneTable, folder: Path | None, index: int) -> SceneTable:
     """The table of a record with absolute paths."""
     with errors_at("motion", f"records[{index}]"):
         return located(table, folder)
 
 
-def _suite(tables: list[Table], target: Table | None, progress: Callable[[float, float], None] | None) -> Suite:
+def _suite(tables: list[SceneTable], target: SceneTable | None, progress: Progress | None) -> Suite:
     if target is None:
         return Suite(_records(tables), None)
     from msfp_gen.motions.records import ScaleTo, scaled_suite
@@ -379,7 +377,7 @@ def _suite(tables: list[Table], target: Table | None, progress: Callable[[float,
     return Suite(_records([{**table, "scale": f} for table, f in zip(tables, factors, strict=True)]), scaled, target)
 
 
-def _records(tables: list[Table]) -> tuple[SuiteRecord, ...]:
+def _records(tables: list[SceneTable]) -> tuple[SuiteRecord, ...]:
     records = []
     for index, table in enumerate(tables):
         try:

@@ -13,6 +13,7 @@ from dataclasses import MISSING
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
+from msfp_gen.common.aliases import SceneTable
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Choice, Quantity, Rule, Text, ruled_fields
 from msfp_gen.motions.records.scaling import ScaleTo
@@ -26,8 +27,6 @@ from msfp_gen.scene.sheet import BOUNDS, Sheet
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Auto, Layout
-
-Table = dict[str, Any]
 
 
 class Place(NamedTuple):
@@ -291,23 +290,23 @@ SUITE = Keys(
 )
 
 
-def validate_part(name: str, table: Mapping[str, Any]) -> Table:
+def validate_part(name: str, table: Mapping[str, Any]) -> SceneTable:
     """The table `[bearing]`, `[top]` or `[solver]` alone, as of `validate`; raises InputError of one line."""
     return validate(SCENE, {name: table}, SCENE.keys)[name]  # type: ignore[no-any-return]
 
 
-def validate_suite(table: Mapping[str, Any]) -> Table:
+def validate_suite(table: Mapping[str, Any]) -> SceneTable:
     """The same for a suite of records: `records`, and `scale_to` with `least_share`."""
     return validate(SUITE, table)
 
 
-def validate(keys: Keys, table: Mapping[str, Any], absent: Collection[str] = ()) -> Table:
+def validate(keys: Keys, table: Mapping[str, Any], absent: Collection[str] = ()) -> SceneTable:
     """A table with its quantities in SI units and only the given keys; raises InputError of one line.
 
     absent: keys that the table need not have.
     """
     errors = Errors()
-    found: Table = keys.read(table, Place(""), errors, absent)
+    found: SceneTable = keys.read(table, Place(""), errors, absent)
     errors.raise_first()
     return found
 

@@ -14,12 +14,12 @@ from functools import cached_property
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.tables import Table
 from msfp_gen.model.model import build_model, working_time
 from msfp_gen.scene.effect_selection import slider_period
 from msfp_gen.scene.system import System
-from msfp_gen.simulation.outcome import Progress
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.accuracy.timed_run import (
     CUT_OFF,

@@ -6,7 +6,6 @@ CSV and a figure of the loops.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.output import check_output
@@ -49,7 +49,6 @@ if TYPE_CHECKING:
     from msfp_gen.scene.system import System
 
 CASES = ("lower", "nominal", "upper")
-Progress = Callable[[float, float], None]
 
 
 @dataclass(frozen=True)

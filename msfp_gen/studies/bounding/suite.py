@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.output import check_output
@@ -167,7 +168,7 @@ def suite_study(
     scene: str | Path | Mapping[str, Any],
     suite: str | Path,
     factors: str | Path,
-    progress: Callable[[float, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Study:
     """The study of `bound_suite`: one run for each record, slowest, and each bound. Arguments: as of `bound_suite`.
 
@@ -195,7 +196,7 @@ def bound_suite(
     *,
     leave_out: Collection[str] = (),
     workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> SuiteBounds:
     """Run the cases of `bound` under each motion of a suite, and keep the quantities of the runs.
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from msfp_gen.common.aliases import FitProgress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.scene.plausibility import require_meant
@@ -22,7 +23,6 @@ from msfp_gen.studies.calibration.intervals import Identified, Spread, identifie
 from msfp_gen.studies.calibration.measurement import FittedTest, Measurement, read_measurement
 from msfp_gen.studies.calibration.residuals import (
     Evaluation,
-    Progress,
     Residuals,
     changed_scene,
     scenes_of,
@@ -44,7 +44,7 @@ def fit(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     offset: bool = False,
     columns: Mapping[str, str] | None = None,
-    progress: Progress | None = None,
+    progress: FitProgress | None = None,
     max_evaluations: int = 100,
     force: bool = False,
 ) -> Fit:
@@ -96,7 +96,7 @@ def start_fit(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     offset: bool = False,
     columns: Mapping[str, str] | None = None,
-    progress: Progress | None = None,
+    progress: FitProgress | None = None,
     force: bool = False,
 ) -> Residuals:
     """Check the input of a fit; returns its residuals. Arguments and InputError as of `fit`."""

@@ -6,13 +6,14 @@ go out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from msfp_gen.common.aliases import FitProgress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.errors import InputError, RunError
@@ -34,7 +35,6 @@ _OF_THE_TEST = {
     "load": "the tests have no load history",
     "initial_state": "a test starts at the centre of the bearing",
 }
-Progress = Callable[[int, float, float], None]  # number of the evaluation, its share done, last deviation [N]
 Run = tuple[Array, Array] | RunError | InputError  # force and its derivatives at the times of a test, or the error
 TRAVEL = 1.5  # peak displacement of a test over the sum of all capacities, at most
 RATIOS = 1e-3, 5.0  # peak force of a test over the axial load, at least and at most
@@ -179,7 +179,7 @@ class Residuals:
     scenes: tuple[Scene, ...]
     unknowns: tuple[Unknown, ...]
     with_offset: bool
-    progress: Progress | None = None
+    progress: FitProgress | None = None
     count: int = 0
     deviation: float = np.nan
     _last: tuple[bytes, Evaluation] | None = None
