@@ -15,7 +15,7 @@ import numpy as np
 
 from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.momentum import Momentum, momentum
-from msfp_gen.auditing.sliding import CLOSED, ERRORS, NEAR_RIM, Factor, Sliding
+from msfp_gen.auditing.sliding import CLOSED, ERRORS, NEAR_RIM, FittedFactor, Sliding
 from msfp_gen.auditing.stated import Stated
 from msfp_gen.common.arrays import Array
 
@@ -133,7 +133,7 @@ class AuditCase:
             return Answer(OPEN, f"no column {' and '.join(missing)}; with it this can be decided")
         return None
 
-    def fitted(self, name: str) -> Factor | Answer:
+    def fitted(self, name: str) -> FittedFactor | Answer:
         """A fitted factor, or the answer where there is none."""
         if lack := self.lacks("displacement", "force", "axial"):
             return lack

@@ -31,7 +31,7 @@ THEORY = 0.01  # of friction: what rigid links leave out of the force of a sound
 ERRORS = 3.0  # standard errors within which two values agree
 
 
-class Factor(NamedTuple):
+class FittedFactor(NamedTuple):
     """A fitted factor, its standard error, and the factor of the other theory where that fits as well.
 
     The theories are those of small angles, which most programs have, and of links that turn by any angle.
@@ -49,10 +49,10 @@ class Factor(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Fit:
+class SlidingFit:
     """Factors of the parts of the force: `radius` (1/L), `friction`, `heat`, `coupling`, `damping` [N s/m]."""
 
-    factors: dict[str, Factor]
+    factors: dict[str, FittedFactor]
     residual: float  # root mean square over the friction force [-]
 
 
@@ -139,15 +139,15 @@ class Sliding:
         return friction
 
     @cached_property
-    def fit(self) -> Fit:
+    def fit(self) -> SlidingFit:
         """The fitted factors. Needs `enough`."""
         better, other = sorted((self._fitted(large=False), self._fitted(large=True)), key=lambda fitted: fitted[1])
         open_ = other[1] < AS_WELL * better[1]
         factors = {
-            name: Factor(value, error, other[0].get(name, (value, 0.0))[0] if open_ else value)
+            name: FittedFactor(value, error, other[0].get(name, (value, 0.0))[0] if open_ else value)
             for name, (value, error) in better[0].items()
         }
-        return Fit(factors, better[1])
+        return SlidingFit(factors, better[1])
 
     def _fitted(self, large: bool) -> tuple[dict[str, tuple[float, float]], float]:
         data, rows, law, radius = self.histories, self.rows, self.law, self.stated.radius

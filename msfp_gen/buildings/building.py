@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from msfp_gen.buildings.oscillators import FixedBase, Oscillators
-from msfp_gen.buildings.storey import FREEDOMS, MOTIONS, BaseSlab, Columns, Node, Storey, frame, rigid
+from msfp_gen.buildings.storey import FREEDOMS, MOTIONS, BaseSlab, Node, Storey, StoreyColumns, frame, rigid
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, MsfpError
 from msfp_gen.common.fields import LARGEST, quantities, require_type
@@ -96,7 +96,7 @@ class Building(Printed):
     damping: Array
     stiffness: Array
     nodes: tuple[Node, ...]
-    columns: tuple[Columns, ...] = ()
+    columns: tuple[StoreyColumns, ...] = ()
 
     def printed_rows(self) -> tuple[str, Rows]:
         """Sizes and frequencies in four rows."""
@@ -257,7 +257,7 @@ class Building(Printed):
         basis = np.hstack([self._static, modes])
         nodes = tuple(replace(node, rows=node.rows @ basis) for node in self.nodes)
         columns = tuple(
-            Columns(column.name, column.deformation @ basis, column.inertia @ basis) for column in self.columns
+            StoreyColumns(column.name, column.deformation @ basis, column.inertia @ basis) for column in self.columns
         )
         mass, damping, stiffness = (_congruent(matrix, basis) for matrix in (self.mass, self.damping, self.stiffness))
         return Building(mass, damping, stiffness, nodes, columns)

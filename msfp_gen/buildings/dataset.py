@@ -16,7 +16,7 @@ from msfp_gen.buildings.extremes import DIMENSIONS, OF_SURFACES, SIZES, Building
 from msfp_gen.buildings.file import stored_bearing
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.spectra import Steps
-from msfp_gen.buildings.storey import FREEDOMS, Columns, Node
+from msfp_gen.buildings.storey import FREEDOMS, Node, StoreyColumns
 from msfp_gen.common.arrays import Array
 from msfp_gen.motions.motion import Motion
 from msfp_gen.results.dataset import ROWS as ONE_BEARING
@@ -110,7 +110,7 @@ def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -
         for row, position, rows in of_nodes
     )
     of_storeys = zip(table.get("column", []), arrays["deformation"], arrays["inertia"], strict=True)
-    columns = tuple(Columns(str(row["name"]), deformation, inertia) for row, deformation, inertia in of_storeys)
+    columns = tuple(StoreyColumns(str(row["name"]), deformation, inertia) for row, deformation, inertia in of_storeys)
     building = Building(arrays["mass"], arrays["damping"], arrays["stiffness"], nodes, columns)
     bearings = []
     for index, row in enumerate(table["bearing"]):

@@ -27,7 +27,18 @@ from msfp_gen.scene.file.loader import (
     scene_parts,
 )
 from msfp_gen.scene.file.motion_tables import Paths, located, motion_from, paths_in, resolved
-from msfp_gen.scene.file.schema import EFFECTS, LIMITS, MOTION, SOLVER, Key, ListOf, Value, keys_of, required, validate
+from msfp_gen.scene.file.schema import (
+    EFFECTS,
+    LIMITS,
+    MOTION,
+    SOLVER,
+    Key,
+    ListOf,
+    ParsedValue,
+    keys_of,
+    required,
+    validate,
+)
 from msfp_gen.scene.file.source import MOTION_PATHS
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import Kind
@@ -87,8 +98,8 @@ def _tables(value: Any, *, text: bool) -> SceneTable:
 
 _COMMON = {"interface": Key(_INTERFACE), "soil": Key(_SOIL), "effects": Key(EFFECTS)}
 _SINGLE = {**_COMMON, "motion": Key(MOTION)}
-_BEARING = keys_of(BuildingBearing, bearing=required(Value(_any)), grid=Key(keys_of(GridTable)), **_SINGLE)
-_STORED = keys_of(BuildingBearing, bearing=required(Value(_any)), **_SINGLE)
+_BEARING = keys_of(BuildingBearing, bearing=required(ParsedValue(_any)), grid=Key(keys_of(GridTable)), **_SINGLE)
+_STORED = keys_of(BuildingBearing, bearing=required(ParsedValue(_any)), **_SINGLE)
 _BUILDING = keys_of(
     FrameTable,
     base=Key(_BASE),
@@ -100,7 +111,7 @@ _BUILDING = keys_of(
 SCENE = keys_of(
     BuildingScene,
     building=required(_BUILDING),
-    bearings=Key(Value(_tables)),
+    bearings=Key(ParsedValue(_tables)),
     motion=required(MOTION),
     solver=Key(SOLVER),
     limits=Key(LIMITS),

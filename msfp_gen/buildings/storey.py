@@ -120,7 +120,7 @@ class Storey:
         return np.array([k1, k2, self.vertical_stiffness or 0.0, r1, r2, self.torsional_stiffness])
 
 
-class Columns(NamedTuple):
+class StoreyColumns(NamedTuple):
     """Deformation and force of the columns of a storey, at half height at the stiffness centre.
 
     deformation: rows, shape (6, n) [SI]; times the coordinates they are the motion of the floor above relative to the
@@ -133,7 +133,9 @@ class Columns(NamedTuple):
     inertia: Array
 
 
-def frame(base: BaseSlab, storeys: Sequence[Storey]) -> tuple[Array, Array, tuple[Node, ...], tuple[Columns, ...]]:
+def frame(
+    base: BaseSlab, storeys: Sequence[Storey]
+) -> tuple[Array, Array, tuple[Node, ...], tuple[StoreyColumns, ...]]:
     """Mass and stiffness of an undamped frame, both shape (n, n) [SI], its floors from the base upwards, and columns.
 
     The coordinates are motions of the floors at the origin of the plan; the nodes are at their centres of mass.
@@ -178,14 +180,14 @@ def _floors(storeys: Sequence[Storey]) -> tuple[Node, ...]:
     return tuple(nodes)
 
 
-def _columns(nodes: Sequence[Node], inertias: Sequence[Array], index: int, storey: Storey) -> Columns:
+def _columns(nodes: Sequence[Node], inertias: Sequence[Array], index: int, storey: Storey) -> StoreyColumns:
     """The columns of a storey by its index, from 1. inertias: of all floors, as of `_inertia`."""
     below, floor = nodes[index - 1], nodes[index]
     point = np.array([*storey.stiffness_centre, (below.position[2] + floor.position[2]) / 2])
     inertia = np.zeros_like(floor.rows)
     for node, of_floor in zip(nodes[index:], inertias[index:], strict=True):
         inertia += rigid(node.position - point).T @ of_floor
-    return Columns(f"storey {index}", floor.linked(point) - below.linked(point), inertia)
+    return StoreyColumns(f"storey {index}", floor.linked(point) - below.linked(point), inertia)
 
 
 # Field of `Soil` that is not modelled -> reason and remedy.

@@ -32,7 +32,7 @@ TIME_TOLERANCE = 1e-9
 """Times that differ by less than TIME_TOLERANCE max(1, t) [s] are equal: no step is shorter (same value in run.c)."""
 
 
-class History(Protocol):
+class PrescribedHistory(Protocol):
     """A prescribed history, such as a motion, a load or a rotation: piecewise polynomials in time."""
 
     @property
@@ -67,7 +67,7 @@ class Resolution:
     steps: Array
 
     @classmethod
-    def of(cls, history: History, orders: Sequence[int], longest: float | None = None) -> Resolution:
+    def of(cls, history: PrescribedHistory, orders: Sequence[int], longest: float | None = None) -> Resolution:
         """Requirements of a history.
 
         Args:
@@ -107,7 +107,9 @@ class TimeGrid:
     steps: Array
 
     @classmethod
-    def of_histories(cls, histories: Sequence[History], end: float, steps: Iterable[float | None]) -> TimeGrid:
+    def of_histories(
+        cls, histories: Sequence[PrescribedHistory], end: float, steps: Iterable[float | None]
+    ) -> TimeGrid:
         """The grid of histories with their jumps; what changes in a piece shorter than any step is one too.
 
         end: of the run [s]. steps: longest that are permitted [s]; None: not limited.

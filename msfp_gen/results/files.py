@@ -178,7 +178,7 @@ def export_columns(result: AnyResult, path: str | Path, names: Sequence[str] | N
     return WRITERS[target.suffix.lower()](result, target, names)
 
 
-class Column(NamedTuple):
+class TableColumn(NamedTuple):
     """One column of the table of a run: variable of the dataset, name, unit, meaning, and values, shape (T,) [unit]."""
 
     variable: str
@@ -188,7 +188,7 @@ class Column(NamedTuple):
     values: Array
 
 
-def table_of(dataset: xr.Dataset) -> list[Column]:
+def table_of(dataset: xr.Dataset) -> list[TableColumn]:
     """Every variable along time as columns, as of `columns_of`.
 
     Surfaces that a bearing of a building does not have are left out.
@@ -204,7 +204,7 @@ def table_of(dataset: xr.Dataset) -> list[Column]:
     return columns
 
 
-def selected_columns(table: list[Column], names: Sequence[str] | None) -> list[Column]:
+def selected_columns(table: list[TableColumn], names: Sequence[str] | None) -> list[TableColumn]:
     """The columns with these names, or of these variables, after time; all for None. Raises InputError."""
     if names is None:
         return table
@@ -220,8 +220,8 @@ def selected_columns(table: list[Column], names: Sequence[str] | None) -> list[C
     return chosen
 
 
-def _column(variable: xr.DataArray, name: str, values: Array) -> Column:
-    return Column(str(variable.name), name, str(variable.attrs["units"]), str(variable.attrs["long_name"]), values)
+def _column(variable: xr.DataArray, name: str, values: Array) -> TableColumn:
+    return TableColumn(str(variable.name), name, str(variable.attrs["units"]), str(variable.attrs["long_name"]), values)
 
 
 def _sign_text() -> str:

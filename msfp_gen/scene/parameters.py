@@ -71,7 +71,7 @@ REMEDY = (
 )
 
 
-class _Place(NamedTuple):
+class _ParameterPlace(NamedTuple):
     """The place that a path names: part, field, indices with None for all, and how many there are of each."""
 
     part: str
@@ -105,7 +105,7 @@ def _parameters(scene: Scene, text: str) -> Iterator[Parameter]:
         yield _parameter(scene, place.part, place.field, index)
 
 
-def _place(scene: Scene, text: str) -> _Place:
+def _place(scene: Scene, text: str) -> _ParameterPlace:
     """The place of a path. Raises InputError where there is none."""
     steps = [_STEP.fullmatch(step) for step in text.split(".")]
     names = [step[1] for step in steps if step]
@@ -125,7 +125,7 @@ def _place(scene: Scene, text: str) -> _Place:
         if names[0] == "top":
             return _field_place("top", type(scene.top), names[1], brackets)
         if names[0] == "initial_state" and names[1] in _STATE:
-            return _Place(names[0], names[1], _indices(brackets[1], 2), (count, _STATE[names[1]][1]))
+            return _ParameterPlace(names[0], names[1], _indices(brackets[1], 2), (count, _STATE[names[1]][1]))
         if names[0] in ("motion", "load"):
             return _history_place(scene, names[0], names[1], brackets[1])
     raise InputError(f"a run has no gradient with respect to it; {REMEDY}")
@@ -133,25 +133,25 @@ def _place(scene: Scene, text: str) -> _Place:
 
 def _row_place(
     part: str, kind: type, field: str, row: list[str], component: list[str], count: int, extra: list[str]
-) -> _Place:
+) -> _ParameterPlace:
     if extra:
         raise InputError("there is one bearing; leave out its index")
     rule = _rule(f"bearing.{part}", kind, field)
     _refuse_without(part, field)
     if len(row) != 1:
         raise InputError(f"there are {count} {part}; give bearing.{part}[0].{field}, or bearing.{part}[*].{field}")
-    return _Place(part, field, _indices(row, 1) + _components(rule, component), (count, *_shape(rule)))
+    return _ParameterPlace(part, field, _indices(row, 1) + _components(rule, component), (count, *_shape(rule)))
 
 
-def _field_place(part: str, kind: type, field: str, brackets: list[list[str]]) -> _Place:
+def _field_place(part: str, kind: type, field: str, brackets: list[list[str]]) -> _ParameterPlace:
     if brackets[0]:
         raise InputError(f"there is one {part}; leave out its index")
     rule = _rule(part, kind, field)
     _refuse_without(part, field)
-    return _Place(part, field, _components(rule, brackets[1]), _shape(rule))
+    return _ParameterPlace(part, field, _components(rule, brackets[1]), _shape(rule))
 
 
-def _history_place(scene: Scene, part: str, field: str, brackets: list[str]) -> _Place:
+def _history_place(scene: Scene, part: str, field: str, brackets: list[str]) -> _ParameterPlace:
     known = ["scale", "direction"] if part == "motion" else ["scale"]
     table = scene.motion_table or {}
     if part == "motion" and table.get("kind") in _ANALYTIC:
@@ -160,7 +160,7 @@ def _history_place(scene: Scene, part: str, field: str, brackets: list[str]) -> 
         raise InputError("this scene has no load history; give one")
     if field not in known or brackets:
         raise InputError(f"no parameter of this {part}; give {' or '.join(f'{part}.{name}' for name in known)}")
-    return _Place(part, field, (), ())
+    return _ParameterPlace(part, field, (), ())
 
 
 def _refuse_without(part: str, field: str) -> None:

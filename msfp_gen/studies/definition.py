@@ -74,7 +74,7 @@ _CHUNK = Quantity("", least=1, whole=True)
 
 
 @dataclass(frozen=True)
-class Limits:
+class StudyLimits:
     """Limits of a study: the table `[limits]` of a study file.
 
     run_seconds: wall time after which a run ends with status `limit` [s]. failures: number of runs that may fail; one
@@ -146,7 +146,7 @@ class Study:
     inputs: StudyInputs
     sampling: Sampling | None
     keep: Keep
-    limits: Limits
+    limits: StudyLimits
     given_chunk: int | None
     table: dict[str, Any]
     files: Files = field(default_factory=dict)
@@ -461,7 +461,7 @@ def _checked_study(table: Mapping[str, Any], folder: Path | None, progress: Prog
             inputs=StudyInputs(scene, axes, tables, factors, intensities),
             sampling=sampling,
             keep=keep,
-            limits=Limits(**fields_of(table, "limits", Limits)),
+            limits=StudyLimits(**fields_of(table, "limits", StudyLimits)),
             given_chunk=None if table.get("chunk") is None else parsed(_CHUNK, table["chunk"], "chunk"),
             table=complete,
         )

@@ -52,7 +52,7 @@ class Place(NamedTuple):
 _NUMBERED = {"bearing.surfaces": ("surface", 1), "bearing.bodies": ("body", 2)}
 
 
-class Errors:
+class TableErrors:
     """The errors of one table. A misspelt key is unknown, and the right one missing: the former is more helpful."""
 
     def __init__(self) -> None:
@@ -78,11 +78,11 @@ class Reader(ABC):
         return ()
 
     @abstractmethod
-    def read(self, value: Any, place: Place, errors: Errors) -> Any:
+    def read(self, value: Any, place: Place, errors: TableErrors) -> Any:
         """The value in SI units; adds its errors."""
 
 
-class Value(Reader):
+class ParsedValue(Reader):
     """Reads a value by the `parse` of a rule, texts with units included."""
 
     def __init__(self, parse: Callable[..., Any]) -> None:
@@ -97,7 +97,7 @@ class Value(Reader):
             return str(error)
         return Reader.remedy
 
-    def read(self, value: Any, place: Place, errors: Errors) -> Any:
+    def read(self, value: Any, place: Place, errors: TableErrors) -> Any:
         """As of `Reader`."""
         try:
             return self._parse(value, text=True)
@@ -127,7 +127,7 @@ class Keys(Reader):
         """Itself."""
         return (("", self),)
 
-    def read(self, value: Any, place: Place, errors: Errors, absent: Collection[str] = ()) -> Any:
+    def read(self, value: Any, place: Place, errors: TableErrors, absent: Collection[str] = ()) -> Any:
         """As of `Reader`. absent: keys that are not missed."""
         value = value if self.short is None else self.short(value)
         if not isinstance(value, Mapping):
@@ -166,7 +166,7 @@ class OneOf(Reader):
         """Those of all ways."""
         return self.ways.items()
 
-    def read(self, value: Any, place: Place, errors: Errors) -> Any:
+    def read(self, value: Any, place: Place, errors: TableErrors) -> Any:
         """As of `Reader`."""
         value = value if self._short is None else self._short(value)
         if not isinstance(value, Mapping):
@@ -189,7 +189,7 @@ class ListOf(Reader):
         """That of a row."""
         return self.row.tables()
 
-    def read(self, value: Any, place: Place, errors: Errors) -> Any:
+    def read(self, value: Any, place: Place, errors: TableErrors) -> Any:
         """As of `Reader`."""
         if isinstance(value, list | tuple):
             return [self.row.read(row, place.row(index), errors) for index, row in enumerate(value)]
@@ -198,7 +198,7 @@ class ListOf(Reader):
 
 def keys_of(kind: type, /, **more: Key) -> Keys:
     """The table of the fields of a dataclass that have a rule, and of `more` keys."""
-    return Keys({name: Key(Value(rule.parse), default) for name, rule, default in ruled_fields(kind)} | more)
+    return Keys({name: Key(ParsedValue(rule.parse), default) for name, rule, default in ruled_fields(kind)} | more)
 
 
 def required(reader: Reader) -> Key:
@@ -209,7 +209,8 @@ def required(reader: Reader) -> Key:
 def _kinds(kinds: Iterable[Any]) -> OneOf:
     """The tables that their key `kind` distinguishes."""
     ways = {
-        kind.kind: keys_of(kind, kind=required(Value(Choice((kind.kind,)).parse)), **_inner(kind)) for kind in kinds
+        kind.kind: keys_of(kind, kind=required(ParsedValue(Choice((kind.kind,)).parse)), **_inner(kind))
+        for kind in kinds
     }
     return OneOf(ways, lambda table: table.get("kind"))
 
@@ -243,7 +244,7 @@ def _auto(value: Any) -> Any:
 
 
 _SCALE_TO = keys_of(ScaleTo)
-_FRICTION_AT = Key(Value(Choice(("surface", "pivot")).parse), "surface")
+_FRICTION_AT = Key(ParsedValue(Choice(("surface", "pivot")).parse), "surface")
 _FULL = keys_of(
     Bearing,
     friction_at=_FRICTION_AT,
@@ -251,14 +252,14 @@ _FULL = keys_of(
     surfaces=required(ListOf(keys_of(Surface))),
     bodies=required(ListOf(keys_of(Body))),
 )
-_CHANGES = {name: Key(Value(rule.parse)) for name, rule, _ in ruled_fields(Bearing)} | {
-    name: Key(Value(partial(_column, rule))) for kind in (Surface, Body) for name, rule, _ in ruled_fields(kind)
+_CHANGES = {name: Key(ParsedValue(rule.parse)) for name, rule, _ in ruled_fields(Bearing)} | {
+    name: Key(ParsedValue(partial(_column, rule))) for kind in (Surface, Body) for name, rule, _ in ruled_fields(kind)
 }
 _BESIDE_SHEET = {name: key for name, key in _CHANGES.items() if name not in ("friction", *BOUNDS)}
 _BEARING = OneOf(
     {
         "full": _FULL,
-        "preset": Keys({"preset": required(Value(Text().parse)), "friction_at": _FRICTION_AT, **_CHANGES}),
+        "preset": Keys({"preset": required(ParsedValue(Text().parse)), "friction_at": _FRICTION_AT, **_CHANGES}),
         "sheet": Keys({"sheet": required(keys_of(Sheet)), **_BESIDE_SHEET}),
     },
     _way,
@@ -285,7 +286,7 @@ SCENE = keys_of(
 SUITE = Keys(
     {
         "records": required(ListOf(keys_of(motion_tables.RecordMotion, **_inner(motion_tables.RecordMotion)))),
-        "scale_to": Key(keys_of(ScaleTo, least_share=Key(Value(Quantity("", above=0.0).parse)))),
+        "scale_to": Key(keys_of(ScaleTo, least_share=Key(ParsedValue(Quantity("", above=0.0).parse)))),
     }
 )
 
@@ -305,7 +306,7 @@ def validate(keys: Keys, table: Mapping[str, Any], absent: Collection[str] = ())
 
     absent: keys that the table need not have.
     """
-    errors = Errors()
+    errors = TableErrors()
     found: SceneTable = keys.read(table, Place(""), errors, absent)
     errors.raise_first()
     return found

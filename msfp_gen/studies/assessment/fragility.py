@@ -52,7 +52,7 @@ Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Fit:
+class FragilityFit:
     """A fitted curve P = Phi(a + b ln x).
 
     coefficients: a and b, ndarray, shape (2,), [-]. covariance: inverse of the Fisher information of a and b, (2, 2)
@@ -96,7 +96,7 @@ class Fit:
         return np.asarray(ndtr(centre - z * error)), np.asarray(ndtr(centre + z * error))
 
 
-def fitted(log_x: Array, runs: Array, over: Array, where: str, start: Fit | None = None) -> Fit:
+def fitted(log_x: Array, runs: Array, over: Array, where: str, start: FragilityFit | None = None) -> FragilityFit:
     """The fit to `over` exceedances among `runs` runs at each ln x, all ndarrays, shape (levels,).
 
     start: a fit to begin with. Raises InputError that begins with `where`: the runs determine no curve with a positive
@@ -114,7 +114,7 @@ def fitted(log_x: Array, runs: Array, over: Array, where: str, start: Fit | None
     coefficients = unscale @ solution
     if not coefficients[1] > 0:
         raise InputError(f"{where}: exceedances do not grow with the intensity; there is no fragility curve")
-    return Fit(coefficients, unscale @ np.linalg.inv(information) @ unscale.T)
+    return FragilityFit(coefficients, unscale @ np.linalg.inv(information) @ unscale.T)
 
 
 def _check(log_x: Array, runs: Array, over: Array, where: str) -> None:
@@ -191,7 +191,7 @@ class DamageState:
     intensity: Array
     runs_at: Array
     exceeded_at: Array
-    fit: Fit
+    fit: FragilityFit
     samples: Array | None
     level: float
     case: str = ""
@@ -343,7 +343,9 @@ def _state(
     )  # fmt: skip
 
 
-def _bootstrap(levels: Array, level_of_run: Any, exceeded: Any, fit: Fit, groups: Any, count: int, seed: int) -> Array:
+def _bootstrap(
+    levels: Array, level_of_run: Any, exceeded: Any, fit: FragilityFit, groups: Any, count: int, seed: int
+) -> Array:
     """Coefficients of `count` fits to clusters drawn with replacement, shape (count, 2) [-]."""
     # levels: ln x. level_of_run, exceeded, groups: of every run, its index in `levels`, whether it exceeds, and its
     # cluster. Clusters that determine no curve are drawn again. Raises InputError.
