@@ -89,7 +89,7 @@ class FrozenSteps:
 
 def checked_of(values: dict[str, Any]) -> tuple[str, ...]:
     """Names of the rows whose derivatives are checked."""
-    return (*CHECKED, "temperature") if "temperature" in values else CHECKED
+    return (*CHECKED, "temperature") if values.get("temperature") is not None else CHECKED
 
 
 def check_frozen(
