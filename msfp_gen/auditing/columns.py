@@ -31,6 +31,9 @@ OWN = {
     "rise": "-displacement_E3",
     **{f"force_{i}": f"top_force_E{i}" for i in (1, 2)},
     "axial": "top_force_E3",
+    **{f"lower_{i}": f"base_displacement_E{i}" for i in (1, 2, 3)},
+    **{f"upper_{i}": f"top_displacement_E{i}" for i in (1, 2, 3)},
+    **{f"{name}_{i}": f"{name}_{i}" for name in ("sliding", "temperature") for i in range(1, 10)},
 }
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite
+from msfp_gen.results.geometry import body_bases
 
 # Column -> unit and meaning; the number is that of the axis: 1, 2 horizontal, 3 upwards.
 QUANTITIES: dict[str, tuple[str, str]] = {
@@ -23,6 +24,13 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     **{f"acceleration_{i}": ("m/s^2", "absolute acceleration of the supported mass") for i in (1, 2, 3)},
     **{f"position_{i}": ("m", "absolute displacement of the supported mass") for i in (1, 2, 3)},
     **{f"base_acceleration_{i}": ("m/s^2", "acceleration of the base") for i in (1, 2, 3)},
+    **{f"lower_{i}": ("m", "displacement of the lower plate in space") for i in (1, 2, 3)},
+    **{f"upper_{i}": ("m", "displacement of the upper plate in space") for i in (1, 2, 3)},
+    **{f"lower_rotation_{i}": ("rad", "rotation of the lower plate") for i in (1, 2)},
+    **{f"upper_rotation_{i}": ("rad", "rotation of the upper plate") for i in (1, 2)},
+    **{f"sliding_{i}": ("m", "distance from the centre of surface i, bottom first") for i in range(1, 10)},
+    **{f"slip_speed_{i}": ("m/s", "slip velocity of surface i, its size") for i in range(1, 10)},
+    **{f"temperature_{i}": ("degC", "temperature of surface i at its centre") for i in range(1, 10)},
 }  # fmt: skip
 LEAST_ROWS = 20
 
@@ -63,6 +71,10 @@ class Histories:
         for name, values in columns.items():
             if values.shape != self.time.shape:
                 raise InputError(f"{self.name}: {name} has shape {values.shape}; give one number for each time")
+        if self.missing("displacement") and not self.missing("lower", "upper"):
+            across = self.vector("lower") - self.vector("upper")
+            own = {f"displacement_{axis + 1}": across[:, axis] - across[0, axis] for axis in range(2)}
+            object.__setattr__(self, "columns", columns | own)
 
     @property
     def time(self) -> Array:
@@ -121,7 +133,10 @@ class Histories:
 
 
 def histories_of(result: Any) -> Histories:
-    """The histories of a result of this package: of one bearing. Raises InputError for results of buildings."""
+    """The histories of a result of this package: of one bearing, with its ends and surfaces.
+
+    Raises InputError for results of buildings.
+    """
     if len(result.bearings) != 1 or result.bearings[0].mounting is not None:
         raise InputError("result: this is the result of a building; give one of its .bearings as a table of columns")
     rows, top = result.history, result.scene.top
@@ -131,6 +146,17 @@ def histories_of(result: Any) -> Histories:
             f"displacement_{axis + 1}": rows.displacement[:, axis],
             f"force_{axis + 1}": rows.top_force[:, axis],
         }
+    base = result.scene.motion.rotation(np.clip(rows.time, 0.0, result.scene.motion.duration))
+    ends = {"lower": rows.base_displacement, "upper": rows.top_displacement - rows.top_displacement[0]}
+    columns |= {f"{end}_{axis + 1}": values[:, axis] for end, values in ends.items() for axis in range(3)}
+    axes = body_bases(np.concatenate([base[:, None], rows.tilt_angles], axis=1))[..., 2, :]
+    for end, normal in (("lower", axes[:, 0]), ("upper", axes[:, -1])):
+        columns |= {f"{end}_rotation_1": -np.arcsin(normal[:, 1]), f"{end}_rotation_2": np.arcsin(normal[:, 0])}
+    slip = np.linalg.norm(rows.slip_velocity, axis=2)
+    surfaces = {"sliding": rows.sliding, "slip_speed": slip, "temperature": rows.temperature}
+    for name, values in surfaces.items():
+        if values is not None:
+            columns |= {f"{name}_{surface + 1}": values[:, surface] for surface in range(rows.surfaces)}
     free = top.kind == "mass" and not top.height
     if free:
         columns |= {f"position_{axis + 1}": rows.top_displacement[:, axis] for axis in range(3)}

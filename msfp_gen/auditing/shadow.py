@@ -1,4 +1,4 @@
-"""Shadow of a result: recorded motion and axial force drive the full model of the bearing, and the forces are compared.
+"""Shadow of a result: recorded motion and axial force drive the full model of the bearing, and both are compared.
 
 What the element of the other program left out follows by taking effects out of the model one at a time: where the model
 without an effect is nearer to the recorded force, the element does not have it.
@@ -10,31 +10,29 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.auditing.checks import INCONSISTENT
+from msfp_gen.auditing.checks import INCONSISTENT, NO_TENSION
 from msfp_gen.auditing.columns import histories_from
 from msfp_gen.auditing.corrections import corrected
-from msfp_gen.auditing.histories import Histories
+from msfp_gen.auditing.driving import LEAST_LOAD, even_load, opening_scene, opens, shadow_scene
+from msfp_gen.auditing.histories import QUANTITIES, Histories
 from msfp_gen.auditing.stated import Stated, stated_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.tables import Table
-from msfp_gen.motions.motion import Motion
-from msfp_gen.motions.prescribed import Load
 from msfp_gen.results.result import Result
+from msfp_gen.results.sliding import merged, open_times
 from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.top import Top
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.specification.friction_laws import BUILT_IN
-from msfp_gen.specification.layout import Auto
 
 OFF_CENTRE = 0.05  # permitted first displacement over the largest
-LEAST_LOAD = 0.02  # axial force over that at rest that the model is given at least
-HOLD = 5e3  # stiffness of the rig over the axial force at rest [1/m]: it moves some hundredths of a millimetre
+SURFACES = ("sliding", "slip_speed", "temperature")  # columns with the number of a surface
+BOUNCES = 0.05  # closed for less, surfaces bounce [s]
 TIGHTER = 0.1  # tolerance of the run that states the error, over that of the shadow
 NEARER = 0.8  # difference without an effect over that with it, below which the element does not have the effect
 
@@ -46,10 +44,10 @@ class LeftOut:
     Attributes:
         effect: its name.
         before, after: RMS difference from the recorded force with it and without it, over the largest force [-]; None:
-            the model cannot run without it.
+            no run decides it.
         missing: whether the element does not have it: the model without it is nearer, by more than its error. The
-            effects after it are then tried without it too.
-        why: why the model cannot run without it; "" where it does.
+            effects after it are then tried without it too. Lift-off is missing where the record has tension.
+        why: why the model cannot run without it, or what decides; "" where a run does.
     """
 
     effect: str
@@ -59,6 +57,22 @@ class LeftOut:
     why: str = ""
 
 
+class Difference(NamedTuple):
+    """A recorded history against that of the model.
+
+    quantity: name of the column without its number. surface: 1 at the bottom; 0: of the whole bearing. rms, largest:
+    [unit]. size: largest recorded value, of temperatures their rise [unit]. time: of the largest difference [s].
+    """
+
+    quantity: str
+    surface: int
+    rms: float
+    largest: float
+    size: float
+    unit: str
+    time: float
+
+
 @dataclass(frozen=True, eq=False)
 class Shadow:
     """A recorded result beside the full model.
@@ -66,7 +80,9 @@ class Shadow:
     Attributes:
         data: the recorded histories, with signs and units put right.
         stated: the data of the bearing.
-        result: the run of the full model.
+        result: the run of the full model, which carries a fiftieth of the axial force at rest at least.
+        opened: the run in which surfaces part, and the upper plate has the mass that the axial force at rest carries;
+            None where the recorded axial force always presses.
         error: of its force, RMS over the largest force: of the steps of the run and of the rows of the record [-].
         left_out: the effects of the model, tried one after the other.
         notes: what was changed in the record.
@@ -75,6 +91,7 @@ class Shadow:
     data: Histories
     stated: Stated
     result: Result
+    opened: Result | None
     error: float
     left_out: tuple[LeftOut, ...]
     notes: tuple[str, ...] = ()
@@ -83,6 +100,67 @@ class Shadow:
     def force(self) -> Array:
         """Horizontal force of the model at the rows of the record, ndarray, shape (T, 2) [N]."""
         return _force(self.result, self.data)
+
+    @cached_property
+    def histories(self) -> dict[tuple[str, int], tuple[Array, Array]]:
+        """Histories that both have: (quantity, surface) -> recorded and of the model, (T,) or (T, 2) each [SI]."""
+        rows, columns, time = self.result.alone.history, self.data.columns, self.data.time - self.data.time[0]
+        own = {
+            "sliding": rows.sliding,
+            "slip_speed": np.linalg.norm(rows.slip_velocity, axis=2),
+            "temperature": rows.temperature,
+        }
+        found = {("force", 0): (self.data.force, self.force)}
+        for name, values in own.items():
+            for surface in range(1, 0 if values is None else values.shape[1] + 1):
+                if (column := columns.get(f"{name}_{surface}")) is not None:
+                    found[name, surface] = (column, np.interp(time, rows.time, values[:, surface - 1]))
+        return found
+
+    @cached_property
+    def differences(self) -> tuple[Difference, ...]:
+        """The recorded histories against those of the model: the force, and what surfaces did."""
+        return tuple(self._difference(*key, *pair) for key, pair in self.histories.items())
+
+    def _difference(self, quantity: str, surface: int, recorded: Array, own: Array) -> Difference:
+        start = recorded[0] if quantity == "temperature" else 0.0
+        apart, size = (np.linalg.norm(np.reshape(v, (len(v), -1)), axis=1) for v in (recorded - own, recorded - start))
+        row = int(apart.argmax())
+        unit = QUANTITIES[f"{quantity}_1"][0].replace("degC", "K")
+        rms = float(np.sqrt(np.mean(apart**2)))
+        return Difference(
+            quantity, surface, rms, float(apart[row]), float(size.max()), unit, float(self.data.time[row])
+        )
+
+    @cached_property
+    def openings(self) -> list[tuple[float, float]]:
+        """Times in which any surface is open in the model, as (start, length) [s]; those of one lift-off bounce."""
+        if self.opened is None:
+            return []
+        found = open_times(self.opened.alone.history, self.opened.events)
+        spells = merged(spell for surface in found for spell in surface)
+        return [(float(self.data.time[0] + start), float(length)) for start, length in spells]
+
+    @property
+    def lift_off(self) -> str:
+        """When, how long and how far surfaces part in the model; "" where the recorded axial force always presses."""
+        if self.opened is None:
+            return ""
+        low = opens(self.data)
+        span = float((np.gradient(self.data.time) * low).sum())
+        least = f"{self.data.axial[low].min() / 1e3:.4g} kN"
+        first = (
+            f"the recorded axial force is down to {least}, and below {LEAST_LOAD:.0%} of that at rest for {span:.3g} s"
+        )
+        if not self.openings:
+            return f"{first}; no surface parts in the model"
+        whole, longest = sum(length for _, length in self.openings), max(self.openings, key=lambda spell: spell[1])
+        times = len(merged((start, length + BOUNCES) for start, length in self.openings))
+        return (
+            f"{first}; surfaces part {times} time{'s' * (times > 1)}, first at {self.openings[0][0]:.4g} s, open "
+            f"for {whole:.3g} s in all, longest for {longest[1]:.3g} s at {longest[0]:.4g} s, by up to "
+            f"{1e3 * float(self.opened.history.lift.max()):.3g} mm"
+        )
 
     @property
     def difference(self) -> float:
@@ -112,17 +190,16 @@ class Shadow:
         rows = [
             ("forces", self.text),
             ("largest difference", f"{place}, at {self.data.time[row]:.4g} s"),
+            *([("lift-off", self.lift_off)] if self.lift_off else []),
             ("run of the model", self.result.status_text),
             *(("note", note) for note in self.notes),
         ]
         effects = [
-            (one.effect, f"{100 * one.before:.3g} %", "-" if one.after is None else f"{100 * one.after:.3g} %", one.why)
-            if not one.missing
-            else (
+            (
                 one.effect,
                 f"{100 * one.before:.3g} %",
-                f"{100 * (one.after or 0.0):.3g} %",
-                "the element does not have it",
+                "-" if one.after is None else f"{100 * one.after:.3g} %",
+                "; ".join(filter(None, ["the element does not have it" if one.missing else "", one.why])),
             )
             for one in self.left_out
         ]
@@ -130,6 +207,20 @@ class Shadow:
             Table(f"shadow of {self.data.name} by {self.stated.name}", (), rows),
             Table(
                 "RMS difference from the record with and without an effect", ("effect", "with", "without", ""), effects
+            ),
+            Table(
+                "differences from the model",
+                ("history", "RMS", "largest", "of", "at [s]"),
+                [
+                    (
+                        one.quantity + (f", surface {one.surface}" if one.surface else ""),
+                        f"{one.rms:.3g} {one.unit}",
+                        f"{one.largest:.3g} {one.unit}",
+                        f"{one.size:.3g} {one.unit}",
+                        f"{one.time:.4g}",
+                    )
+                    for one in self.differences
+                ],
             ),
             *self.result.part_tables(),
         ]
@@ -144,13 +235,19 @@ class Shadow:
             "error": self.error,
             "missing": list(self.missing),
             "left_out": {one.effect: [one.before, one.after] for one in self.left_out},
+            "differences": [one._asdict() for one in self.differences],
+            "lift_off": self.lift_off,
+            "openings": self.openings,
             "notes": list(self.notes),
             "model": self.result.summary,
         }
 
 
 def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | None = None) -> Shadow:
-    """Drive the full model of a bearing by the recorded motion and axial force, and compare the forces.
+    """Drive the full model of a bearing by the recorded motion and axial force, and compare what it does.
+
+    The motion is that of both plates where there are columns of them, else the displacement across the bearing. Where
+    the axial force is nearly zero or tension, surfaces part.
 
     Args: as of `audit`.
 
@@ -167,63 +264,29 @@ def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | 
         raise InputError(
             f"{given.name}: the first displacement is {1e3 * start:.4g} mm; cut the record to begin at the centre"
         )
+    beyond = [
+        name for name in data.columns if name.startswith(SURFACES) and int(name[-1]) > stated.bearing.layout.surfaces
+    ]
+    if beyond:
+        raise InputError(f"{given.name}: {beyond[0]}: the bearing has {stated.bearing.layout.surfaces} surfaces")
     scene = shadow_scene(data, stated)
     result = simulate(scene)
     force = _force(result, data)
     finer = simulate(replace(scene, solver=replace(scene.solver, rtol=TIGHTER * scene.solver.rtol)))
-    coarser = simulate(replace(scene, motion=_motion(data, 2), load=_load(data, 2)))
+    coarser = simulate(shadow_scene(data, stated, 2))
+    opened = simulate(opening_scene(data, scene, result)) if opens(data).any() else None
     largest = float(np.hypot(*data.force.T).max())
     others = [np.sqrt(np.mean(np.sum((_force(one, data) - force) ** 2, axis=1))) for one in (finer, coarser)]
     error = float(np.hypot(others[0], others[1] / 3.0)) / largest
     left_out = tuple(_left_out(scene, result, data, error))
     notes = [answer.sentence for answer in found.values() if answer.verdict == INCONSISTENT]
-    low = data.axial < LEAST_LOAD * data.at_rest
-    if low[data.moved_at() :].any():
-        span = float((np.gradient(data.time) * low).sum())
-        notes.append(f"the axial force is below {100 * LEAST_LOAD:g} % of that at rest for {span:.3g} s: it would open")
-    return Shadow(data, stated, result, error, left_out, tuple(notes))
-
-
-def shadow_scene(data: Histories, stated: Stated) -> Scene:
-    """The bearing in a rig that holds its upper plate, moved as recorded, under the recorded axial force."""
-    rest = data.at_rest
-    top = Top.rig(rest, HOLD * rest, 1e-3 * HOLD * rest, HOLD * rest, 1e-3 * HOLD * rest)
-    effects = Auto() if stated.scene is None else stated.scene.effects
-    scene = Scene(
-        stated.bearing,
-        _motion(data),
-        top,
-        effects,
-        load=_load(data),
-        output_step=data.step,
-        name=f"shadow of {data.name}",
-    )
-    return scene if stated.scene is None else replace(scene, solver=stated.scene.solver)
-
-
-def _motion(data: Histories, step: int = 1) -> Motion:
-    """The recorded displacement as motion of the base, from every so many rows."""
-    u = data.displacement - data.displacement[0]
-    return Motion.from_arrays(*_last_kept(data.time - data.time[0], np.column_stack([u, 0 * u[:, 0]]), step))
-
-
-def _load(data: Histories, step: int = 1) -> Load:
-    """The axial force beside that at rest."""
-    rest = data.at_rest
-    down = rest - np.maximum(data.axial, LEAST_LOAD * rest)
-    return Load.from_arrays(*_last_kept(data.time - data.time[0], np.column_stack([0 * down, 0 * down, down]), step))
-
-
-def _last_kept(time: Array, values: Array, step: int) -> tuple[Array, Array]:
-    """Every so many rows, and the last one."""
-    rows = np.unique(np.append(np.arange(0, len(time), step), len(time) - 1))
-    return time[rows], values[rows]
+    return Shadow(data, stated, result, opened, error, left_out, tuple(notes))
 
 
 def _force(result: Result, data: Histories) -> Array:
-    """Force of a run at the rows of a record, (T, 2) [N]."""
-    time = data.time - data.time[0]
-    return np.column_stack([np.interp(time, result.history.time, result.history.top_force[:, i]) for i in (0, 1)])
+    """Force of a run on its upper plate at the rows of a record, without the inertia of the plate, (T, 2) [N]."""
+    time, own = data.time - data.time[0], result.alone.history
+    return np.column_stack([np.interp(time, own.time, own.interface_force[:, -1, i]) for i in (0, 1)])
 
 
 def _difference(force: Array, data: Histories) -> float:
@@ -241,7 +304,7 @@ def _variants(scene: Scene, result: Result, data: Histories) -> Iterator[tuple[s
     if word in BUILT_IN:
         yield "friction by velocity and pressure", lambda one: one.with_effects(friction="constant")
     if np.std(data.axial) > 1e-3 * data.at_rest:
-        yield "varying axial force", lambda one: replace(one, load=None)
+        yield "varying axial force", lambda one: even_load(data, one)
     if np.any(result.history.rim_force > 0):
         yield "rims", lambda one: one.with_effects(rims=False)
     if scene.bearing.layout.n > 3:
@@ -251,6 +314,8 @@ def _variants(scene: Scene, result: Result, data: Histories) -> Iterator[tuple[s
 def _left_out(scene: Scene, result: Result, data: Histories, error: float) -> Iterator[LeftOut]:
     """Effects taken out one after the other; those that the element does not have stay out."""
     before = _difference(_force(result, data), data)
+    if data.axial.min() < -NO_TENSION * data.at_rest:
+        yield LeftOut("lift-off", before, None, True, "its axial force is a tension")
     for name, without in _variants(scene, result, data):
         try:
             changed = without(scene)

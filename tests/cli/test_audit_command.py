@@ -10,6 +10,7 @@ import pytest
 from support import ROOT
 from support.audits import run_of, shaken
 
+from msfp_gen.auditing.histories import QUANTITIES
 from msfp_gen.cli import main
 from msfp_gen.scene.file.loader import scene_text
 
@@ -24,8 +25,8 @@ def files(tmp_path):
     table = np.column_stack([data.columns[name] for name in names])
     table[:, [names.index("force_1"), names.index("axial")]] *= 0.5e-3
     np.savetxt(tmp_path / "out.csv", table, delimiter=",", header=",".join(names), comments="", fmt="%.9g")
-    units = {"time": "s", "axial": "kN", "force_1": "kN", "force_2": "N"}
-    columns = [f'{name} = "{name} [{units.get(name, "m")}]"' for name in names]
+    units = {name: QUANTITIES[name][0] for name in names} | {"axial": "kN", "force_1": "kN"}
+    columns = [f'{name} = "{name} [{unit}]"' for name, unit in units.items()]
     (tmp_path / "map.toml").write_text("\n".join(['mass = "204081.6 kg"', "[columns]", *columns]))
     (tmp_path / "scene.toml").write_text(scene_text(scene))
     return tmp_path
@@ -76,14 +77,13 @@ def test_bad_input_is_one_line(files, capsys, monkeypatch, arguments, words):
 
 def test_the_page_lists_columns_and_checks():
     from msfp_gen.auditing.checks import CHECKS
-    from msfp_gen.auditing.histories import QUANTITIES
 
     rows = set(re.findall(r"^\| `(\w+)`", PAGE, re.MULTILINE))
     assert set(CHECKS) <= rows
     listed = set(re.findall(r"`(\w+)`", "\n".join(re.findall(r"^\|.*", PAGE, re.MULTILINE))))
-    assert {name for name in QUANTITIES if not name.endswith("_2") or "position" not in name} - listed <= {
-        "acceleration_2", "position_2", "base_acceleration_2"
-    }  # fmt: skip
+    surfaces = {f"{name}_{i}" for name in ("sliding", "slip_speed", "temperature") for i in range(2, 10)}
+    between = {f"{name}_2" for name in ("acceleration", "position", "base_acceleration", "lower", "upper")}
+    assert set(QUANTITIES) - listed <= surfaces | between
 
 
 def test_the_example_of_the_page_prints_what_it_says(capsys):
