@@ -80,9 +80,9 @@ class Audit:
 
     def page(self, path: str | Path) -> Path:
         """Write an HTML page with the evidence drawn. Raises InputError for a path that cannot be written."""
-        from msfp_gen.auditing.page import write_audit
+        from msfp_gen.auditing.page import audit_opinion, write_opinion
 
-        return write_audit(self, path)
+        return write_opinion(audit_opinion(self), path)
 
 
 def _number(one: Finding) -> str:

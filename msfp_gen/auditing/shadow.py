@@ -72,6 +72,11 @@ class Difference(NamedTuple):
     unit: str
     time: float
 
+    @property
+    def title(self) -> str:
+        """Quantity and surface in words."""
+        return self.quantity.replace("_", " ") + (f", surface {self.surface}" if self.surface else "")
+
 
 @dataclass(frozen=True, eq=False)
 class Shadow:
@@ -213,7 +218,7 @@ class Shadow:
                 ("history", "RMS", "largest", "of", "at [s]"),
                 [
                     (
-                        one.quantity + (f", surface {one.surface}" if one.surface else ""),
+                        one.title,
                         f"{one.rms:.3g} {one.unit}",
                         f"{one.largest:.3g} {one.unit}",
                         f"{one.size:.3g} {one.unit}",
@@ -241,6 +246,12 @@ class Shadow:
             "notes": list(self.notes),
             "model": self.result.summary,
         }
+
+    def page(self, path: str | Path) -> Path:
+        """Write an HTML page with the evidence drawn. Raises InputError for a path that cannot be written."""
+        from msfp_gen.auditing.page import shadow_opinion, write_opinion
+
+        return write_opinion(shadow_opinion(self), path)
 
 
 def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | None = None) -> Shadow:

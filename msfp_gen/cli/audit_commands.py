@@ -23,6 +23,7 @@ MapFile = Annotated[
     Path | None,
     typer.Option("--map", metavar="FILE.toml", help="Names and units of the columns; default: a CSV of msfp-gen."),
 ]
+PageFile = Annotated[Path | None, typer.Option(metavar="FILE.html", help="Write a page with the evidence drawn.")]
 
 
 @app.command(
@@ -33,9 +34,7 @@ def audit(
     result: ResultFile,
     bearing: BearingSource,
     map_: MapFile = None,
-    page: Annotated[
-        Path | None, typer.Option(metavar="FILE.html", help="Write a page with the evidence drawn.")
-    ] = None,
+    page: PageFile = None,
     as_json: AsJson = False,
 ) -> None:
     """Check time histories of a bearing, by any program, against mechanics and its data; exit code 1: inconsistent."""
@@ -55,23 +54,30 @@ def audit(
 
 @app.command(
     epilog="Examples:\n\n\b\n  msfp-gen shadow results.csv --bearing bearing.toml --map map.toml\n"
-    "  msfp-gen shadow run.nc --bearing scene.toml -o model.nc"
+    "  msfp-gen shadow run.nc --bearing scene.toml --page shadow.html -o model.nc"
 )
 def shadow(
     result: ResultFile,
     bearing: BearingSource,
     map_: MapFile = None,
+    page: PageFile = None,
     output: Output = None,
     as_json: AsJson = False,
 ) -> None:
     """Drive the full model by a recorded motion and axial force; which effects the other program's element lacks."""
     from msfp_gen.auditing.shadow import shadow as run_shadow
+    from msfp_gen.report.frames import REPORT_SUFFIXES
     from msfp_gen.results.files import check_result_path, save
 
+    if page is not None:
+        check_output(page, REPORT_SUFFIXES, "--page")
     if output is not None:
         check_result_path(output, "--output")
     found = run_shadow(result, bearing, map_)
     answer(found.as_dict, found.tables, as_json)
+    if page is not None:
+        found.page(page)
+        note(f"wrote {page}")
     if output is not None:
         save(found.result, output)
         note(f"wrote {output}")

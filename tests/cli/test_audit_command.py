@@ -96,7 +96,14 @@ def test_the_example_of_the_page_prints_what_it_says(capsys):
 def test_a_shadow_is_printed_and_written(files, capsys):
     """The force of half the bearings: the axial force is half too, so the model follows it."""
     places = [str(files / "out.csv"), "--bearing", str(files / "scene.toml"), "--map", str(files / "map.toml")]
-    assert main(["shadow", *places, "-o", str(files / "model.nc"), "--json"]) == 0
+    assert main(["shadow", *places, "-o", str(files / "model.nc"), "--json", "--page", str(files / "shadow.html")]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["difference"] < 0.01 and found["missing"] == []
     assert found["model"]["status"] == "ok" and (files / "model.nc").exists()
+    page = (files / "shadow.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png") == 2 + len(found["differences"]) - 1  # a loop along E1, and every difference
+    assert f"+- {100 * found['error']:.1g} %" in page and "differs by less tells nothing" in page
+    for effect in found["left_out"]:
+        assert effect in page
+    assert main(["shadow", *places, "--page", str(files / "shadow.pdf")]) == 2
+    assert "--page" in capsys.readouterr().err
