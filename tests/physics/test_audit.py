@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import numpy as np
 import pytest
 from external import MAT, mat_on_pendulums
+from support import ROOT
 from support.audits import SPACE, SPOILED, rows_of, run_of, shaken, straightened, with_columns, with_force
 
 from msfp_gen import audit, load_scene, simulate
@@ -169,13 +171,29 @@ def test_a_published_plant_has_its_inertia_twice():
     assert found.finding("radius").value == pytest.approx(1.0, abs=0.01)
 
 
+def test_the_page_of_the_plant_prints_what_it_says(capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    page = (ROOT / "docs" / "basemat.md").read_text(encoding="utf-8")
+    exec(re.findall(r"```python\n(.*?)```", page, re.DOTALL)[0], {})
+    said = re.search(r"It prints `(.*?)`", page)
+    assert said and capsys.readouterr().out.strip() == said[1]
+    flux = 0.06 * 10.75e6 / (np.pi * 0.2**2) * 0.3
+    assert flux == pytest.approx(1.5e6, rel=0.05)
+    assert 2 * flux * np.sqrt(4.4e-6 / np.pi) / 18 == pytest.approx(200, rel=0.05)
+
+
 @pytest.mark.slow
 def test_the_plant_is_followed_with_inertia_twice():
     """RMS difference of the displacement over its largest value: 2.5 % with inertia twice, 24 % with it once."""
     apart = {}
-    for times in (1, 2):
+    page = (ROOT / "docs" / "basemat.md").read_text(encoding="utf-8")
+    for times, word in ((1, "once"), (2, "twice")):
         _, recorded, ours = mat_on_pendulums(times)
         apart[times] = np.sqrt(np.mean((ours - recorded) ** 2)) / np.abs(recorded).max()
+        row = re.search(rf"^\| ours, inertia {word} \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) %", page, re.MULTILINE)
+        assert row
+        stated = [float(text) for text in row.groups()]
+        assert stated == pytest.approx([1e3 * ours.max(), -1e3 * ours.min(), 100 * apart[times]], abs=0.1)
     assert apart[2] == pytest.approx(0.025, abs=2e-3) and apart[1] == pytest.approx(0.24, abs=0.01)
 
 
