@@ -112,7 +112,9 @@ def test_the_terminal_table_fits_80_columns() -> None:
 
 def test_a_record_is_read_once_unless_it_changes(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     read, found = records.read_record, []
-    monkeypatch.setattr(records, "read_record", lambda *paths: found.append(paths) or read(*paths))
+    monkeypatch.setattr(
+        records, "read_record", lambda *paths, **options: found.append(paths) or read(*paths, **options)
+    )
     path = tmp_path / "quake.csv"
     path.write_text("time [s], a1 [m/s^2]\n" + "".join(f"{0.02 * k:.2f}, {k % 7 - 3}\n" for k in range(400)))
     scene = tmp_path / "scene.toml"

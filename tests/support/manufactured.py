@@ -24,7 +24,7 @@ from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.scene import top as scene_top
 from msfp_gen.scene.friction_parameters import law_parameters
 from msfp_gen.scene.top import MassTop, is_sprung, load_values
-from msfp_gen.specification.friction_laws import HEAT_KERNEL
+from msfp_gen.specification.friction_laws import HEAT_KERNEL, PLATE_KERNEL
 from support import Array
 
 LOAD = 1e5  # around which the sources are found, downwards [N]
@@ -105,7 +105,7 @@ class State:
     def __init__(self, case: Case, y: Array) -> None:
         b, law = case.count, case.effects.law
         self.heated = law is not None and law.depends_on_temperature
-        sizes = (2 * b, 2 if is_sprung(case.top) else 0, len(HEAT_KERNEL) * b if self.heated else 0, 3, 3)
+        sizes = (2 * b, 2 if is_sprung(case.top) else 0, heat_kernel(case)[0].size if self.heated else 0, 3, 3)
         parts = np.split(y, np.cumsum(sizes)[:-1])
         self.f, self.foot = np.ascontiguousarray(parts[0].reshape(b, 2)), parts[1].copy()
         self.heat = parts[2].reshape(b, -1)
@@ -180,7 +180,7 @@ def initial(case: Case) -> Array:
     y = np.zeros(2 * case.count + 2 * is_sprung(case.top) + 6)
     law = case.effects.law
     if law is not None and law.depends_on_temperature:
-        y = np.zeros(len(y) + len(HEAT_KERNEL) * case.count)
+        y = np.zeros(len(y) + heat_kernel(case)[0].size)
     state = State(case, y)
     sources = np.zeros(len(case.sources))
     for _ in range(4):  # the direction of the slip depends on the friction, the heat on both
@@ -190,9 +190,9 @@ def initial(case: Case) -> Array:
         along = row["slip"] / np.where(size > 0, size, 1.0)
         state.f = np.ascontiguousarray(case.friction * along)
         if state.heated:
-            rate, weight = np.array(HEAT_KERNEL).T
+            rate, weight = heat_kernel(case)
             flux = np.array([heat_flux(case, row, index) for index in range(case.count)])
-            state.heat = np.where(rate > 50, weight / rate, 0.0) * flux[:, None]
+            state.heat = np.divide(weight, rate, where=rate > 50, out=np.zeros_like(rate)) * flux[:, None]
     y[: 2 * case.count] = state.f.ravel()
     if state.heated:
         y[-6 - state.heat.size : -6] = state.heat.ravel()
@@ -222,9 +222,9 @@ def rates(case: Case, supply: Sources, t: float, y: Array) -> Array:
         moves = isinstance(case.top, MassTop)
         out.append(np.array([state.foot[1], foot_acceleration(case, t, row) if moves else 0.0]))
     if state.heated:
-        kernel = np.array(HEAT_KERNEL)
+        rate, weight = heat_kernel(case)
         flux = np.array([heat_flux(case, row, index) for index in range(case.count)])
-        out.append((kernel[:, 1] * flux[:, None] - kernel[:, 0] * state.heat).ravel())
+        out.append((weight * flux[:, None] - rate * state.heat).ravel())
     acceleration = np.array([given.get(f"a{i}", 0.0) for i in (1, 2, 3)])
     return np.concatenate([*out, state.speed, acceleration])
 
@@ -239,6 +239,22 @@ def foot_acceleration(case: Case, t: float, row: dict[str, Array]) -> float:
     tilt, rate, bend = case.coordinates(t)[:, :, 1].sum(axis=1) + case.base(t)[:, 1]
     cosine = -np.sin(tilt) * bend - np.cos(tilt) * rate**2
     return float(row["top_force"][2] + case.load[2]) / top.mass - case.bearing.gravity - top.height * cosine
+
+
+def heat_kernel(case: Case) -> tuple[Array, Array]:
+    """Rates [1/s] and weights [s^-1/2] of the parts of the heat of every surface, shape (n-1, parts).
+
+    Those of a plate are functions of the time over d^2/D (docs/friction.md).
+    """
+    law = case.effects.law
+    assert law is not None
+    if case.effects.friction != "pvtd":
+        rate, weight = np.array(HEAT_KERNEL).T
+        return np.tile(rate, (case.count, 1)), np.tile(weight, (case.count, 1))
+    every = [law_parameters(law, case.bearing, index) for index in range(case.count)]
+    pace = np.array([[par["diffusivity"] / par["plate_thickness"] ** 2] for par in every])
+    rate, weight = np.array(PLATE_KERNEL).T
+    return pace * rate, np.sqrt(pace) * weight
 
 
 def heat_flux(case: Case, row: dict[str, Array], index: int) -> float:

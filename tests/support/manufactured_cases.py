@@ -133,6 +133,7 @@ def smooth() -> dict[str, Case]:
         spatial("pressure and velocity law", double(**hot), steps=SHORT, **with_(SPATIAL, friction="pv")),
         planar("heat, planar", double(**hot), steps=STIFF, **with_(PLANAR, friction="pvt")),
         spatial("heat", double(**hot), steps=STIFF, **with_(SPATIAL, friction="pvt")),
+        planar("heat of plates", double(**hot, plate_thickness=0.15), steps=STIFF, **with_(PLANAR, friction="pvtd")),
         spatial(
             "custom law",
             double(c1=0.5, c2=10.0),
