@@ -178,7 +178,7 @@ def history_notes(
     unseen = (Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity]),) if scene.fidelity in UNSEEN else ()
     stack = scene.fidelity != "equivalent"
     doubts = unseen + tuple(Note(0.0, "value", *doubt) for doubt in scene_doubts(scene) if stack)
-    doubts += shear_notes(scene, history)
+    doubts += shear_notes(scene, history, extremes)
     physics = creep_notes(scene, effects, history)
     physics += peak_notes(scene, effects, history)
     numerics = energy_notes(scene, history) + tolerance_notes(scene, effects, history)
@@ -187,12 +187,12 @@ def history_notes(
     return doubts + numerics + damping_notes(scene, history) + physics
 
 
-def shear_notes(scene: Scene, history: History) -> tuple[Note, ...]:
-    """A note where the horizontal force of the rows exceeds the load at rest."""
-    across = np.hypot(history.top_force[:, 0], history.top_force[:, 1])
-    row = int(across.argmax())
-    doubts = shear_doubts(float(across[row]), load_at_rest(scene), "horizontal force", "load at rest")
-    return tuple(Note(float(history.time[row]), "value", *doubt) for doubt in doubts)
+def shear_notes(scene: Scene, history: History, extremes: Extremes | None) -> tuple[Note, ...]:
+    """A note where the largest horizontal force over all steps exceeds the load at rest."""
+    peaks = Extremes.of_rows(history) if extremes is None else extremes
+    force, time = float(peaks.top_force[3]), float(peaks.times["top_force"][3])
+    doubts = shear_doubts(force, load_at_rest(scene), "horizontal force", "load at rest")
+    return tuple(Note(time, "value", *doubt) for doubt in doubts)
 
 
 def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
