@@ -19,14 +19,13 @@ from msfp_gen.specification.layout import ModelSpec
 
 from . import Generated
 from .derive import Equations, derive
-from .directions import BY_VARIABLES, directed
+from .directions import BY_VARIABLES, COLUMNS, directed
 from .drivers import LENGTHS, form_of, part
 from .emit import function
 from .interface import effects_text, environment, surface_values
 from .lower import lower
 from .program import Block, Program
 from .schedule import (
-    COLUMNS,
     LISTS,
     Call,
     List,

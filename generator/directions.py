@@ -17,7 +17,6 @@ from .blocks import Blocks
 from .lower import directional, moving_symbols, symbol_of, symbols_read
 from .program import Program, Use, fields_of
 from .schedule import (
-    COLUMNS,
     LISTS,
     VARIABLES,
     Call,
@@ -30,6 +29,9 @@ from .schedule import (
     output_is_stored,
     passes_of,
 )
+
+COLUMNS = "MSFP_DOF"
+"""C constant with the number of variables of a step whose derivatives one call carries."""
 
 Entry = tuple[str, str]
 """A list and a field of its block."""

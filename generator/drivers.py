@@ -314,10 +314,14 @@ def _unused(lines: Iterable[Line]) -> list[str]:
     return [name for name in ("p", "dp", "w", "d", "s", "ds") if name not in named]
 
 
+RECORDS = {ListStorage.PARAMETERS: "p", ListStorage.WORK: "w", ListStorage.HERE: "s"}
+"""The argument of a driver that is the record."""
+
+
 def member(one: List, form: str) -> str:
     """C of the blocks of a list, or of their derivatives; empty for parameters where they are constant."""
     if form == "values":
-        return f"{one.storage.value}->{one.name}"
+        return f"{RECORDS[one.storage]}->{one.name}"
     if one.storage is ListStorage.PARAMETERS:
         return f"dp->{one.name}" if form == "directions" else ""
     if form == "tangents":

@@ -20,9 +20,6 @@ from msfp_gen.specification.layout import Effects, ModelSpec
 from .blocks import Blocks
 from .program import Block, Program
 
-COLUMNS = "MSFP_DOF"
-"""C constant with the number of variables whose derivatives one call carries."""
-
 
 class Over(Enum):
     """The bodies or surfaces over which a pass runs."""
@@ -126,9 +123,9 @@ Place = tuple[str, int]
 class ListStorage(Enum):
     """The record in which a list is kept, which decides where its derivatives are."""
 
-    PARAMETERS = "p"
-    WORK = "w"
-    HERE = "s"
+    PARAMETERS = "parameters"
+    WORK = "work area"
+    HERE = "blocks of the schedules"
 
 
 class Per(Enum):

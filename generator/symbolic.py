@@ -302,7 +302,7 @@ def _points(out: Assembled, work: _Evaluation) -> None:
         for k, point, name in point_names(n):
             out.points[f"{letter}_{name}"] = [points[k].get(f"{letter}_{point}{axis}", ZERO) for axis in AXES]
             label = rf"{dots}{{r}}_{{{name}}}" if dots else f"r_{{{name}}}"
-            out.latex_names[sp.Symbol(f"{letter}_{name}", real=True)] = label.replace("_", r"\_", 0)
+            out.latex_names[sp.Symbol(f"{letter}_{name}", real=True)] = label
     for letter, text, latex in (
         ("w", "omega", r"\omega"),
         ("wp", "omega'", r"\omega'"),

@@ -194,3 +194,9 @@ def test_operations_of_a_direction_are_those_of_the_page(uplift: bool, counts: t
     assert tuple(found) == counts
     page = (Path(__file__).parents[3] / "docs" / "architecture.md").read_text(encoding="utf-8")
     assert all(str(count) in page for count in counts)
+
+
+def test_a_schedule_names_no_c() -> None:
+    """Constants, arguments and members of C stand where C is printed."""
+    source = re.sub(r'""".*?"""', "", Path(schedules.__file__).read_text(encoding="utf-8"), flags=re.DOTALL)
+    assert "MSFP_" not in source and not re.search(r"\w->", source)
