@@ -122,6 +122,20 @@ def test_example_of_the_readme_runs(folder: Path) -> None:
     assert done.stdout.startswith("ok") and float(done.stdout.split()[-1]) < 1e-6
 
 
+@pytest.mark.slow  # models of their own
+@pytest.mark.parametrize(
+    "options", [["--sliders", "massless", "--dimension", "planar"], ["--uplift"], ["--top-rotation"]], ids="-".join
+)
+def test_example_of_other_models_runs(options: list[str], tmp_path: Path) -> None:
+    assert not cli.main(["generate", "2", "1", "0", *options, "-o", str(tmp_path)])
+    text = (tmp_path / README).read_text(encoding="utf-8")
+    code = re.search(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert code
+    done = subprocess.run([sys.executable, "-c", code[1]], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("ok") and "nan" not in done.stdout
+
+
 def test_derived_and_shared_sources_lie_apart(folder: Path) -> None:
     """What is in `runtime` is the same for every model, what is in `derived` names this one."""
     shared = {path.name: path.read_text(encoding="utf-8") for path in (folder / "runtime").glob("*.[ch]")}
