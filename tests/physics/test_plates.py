@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from reference import friction_laws as reference
 from scipy.special import erfc
-from support import Array, scene_of
+from support import ROOT, Array, scene_of
 from support.friction_scenes import P_REF, RADIUS, heated, lawful
 
-from msfp_gen import Auto, Bearing, Effects, InputError, Motion, Scene, Top, simulate, temperature_at_depth
+from msfp_gen import Auto, Bearing, Effects, InputError, Motion, Scene, Top, load_scene, simulate, temperature_at_depth
 from msfp_gen.results.depth import rise_inside
 from msfp_gen.results.result import Result
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
@@ -254,3 +254,20 @@ def test_configuration_a_of_another_element(surface: int) -> None:
     of_manual = np.array(MANUAL[surface, USUAL]) - manual
     assert added[-1] == pytest.approx(of_manual[-1], abs=4.0) and added[-1] > 5.0
     assert np.abs(added[:2]).max() < 0.5
+
+
+@pytest.mark.slow
+def test_temperatures_of_the_page() -> None:
+    """Of the dish of `examples/heating.toml` after 20 s, in plates of the thicknesses that docs/friction.md names."""
+    page = " ".join((ROOT / "docs" / "friction.md").read_text(encoding="utf-8").split())
+    scene = load_scene(ROOT / "examples" / "heating.toml")
+    found = []
+    for thickness in (None, 0.02, 0.01, 0.005):
+        bearing = scene.bearing.replace(**({} if thickness is None else {"plate_thickness": thickness}))
+        law = "pvt" if thickness is None else "pvtd"
+        run = simulate(replace(scene, bearing=bearing, effects=replace(scene.effects, friction=law)))
+        assert run.history.temperature is not None
+        found.append(f"{run.history.temperature[-1, 0]:.1f}")
+    half, *plates = found
+    assert f"the dish ends at {plates[0]} instead of {half} °C after 20 s" in page
+    assert f"With 10 mm it is {plates[1]} °C, with 5 mm {plates[2]} °C" in page
