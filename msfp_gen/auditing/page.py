@@ -149,7 +149,7 @@ def _loops(shadow: Shadow) -> list[Finding]:
         u = 1e3 * data.displacement[:, axis]
         curves = [(name, u, values / 1e3) for name, values in (("recorded", force), ("model", own))]
         areas = [float(np.trapezoid(values, data.displacement[:, axis])) / 1e3 for values in (force, own)]
-        sentence = f"the record loses {areas[0]:.4g} kJ along E{axis + 1}, the model {areas[1]:.4g} kJ"
+        sentence = f"the loops enclose {areas[0]:.4g} kJ in the record, {areas[1]:.4g} kJ in the model"
         drawing = Drawing([_every(*curve) for curve in curves], "displacement [mm]", "force [kN]")
         found.append(Finding(f"loop_{axis + 1}", f"loops along E{axis + 1}", NONE, sentence, drawing=drawing))
     return found

@@ -160,10 +160,7 @@ class Stated:
         by_flux, pace = (own["plate_heating"], own[memory.pace]) if memory.pace else (own["heating"], 1.0)
         flux = by_flux * pressure * speed * (np.abs(travel) < own["reach"])
         for _ in range(MOST_ROUNDS):
-            before, temperature = (
-                temperature,
-                start + _heat(memory, pace, time, flux * heated),
-            )
+            before, temperature = temperature, start + _heat(memory, pace, time, flux * heated)
             heated = np.array(coefficient(self.law, state | {memory.variable: temperature})[0])
             if np.abs(temperature - before).max() < SAME_TEMPERATURE:
                 break

@@ -12,9 +12,7 @@ _RUN = RUN | {
 }
 LEAST, MOST = "least axial force over the load at rest", "largest axial force over the load at rest"
 AT_CORNERS = "peak floor acceleration at corners"
-LEAST_LEFT = (
-    "least capacity left of a surface"  # the inner ones of a triple pendulum have little, however far it may move
-)
+LEAST_LEFT = "least capacity left of a surface"  # inner ones of a triple pendulum have little, however far it moves
 QUANTITIES = _RUN | {
     "peak_base_torsion": Quantity("N m", "peak_base_torsion", extreme="most"),
     "peak_overturning_moment": Quantity("N m", "peak_overturning_moment.radial", "most"),

@@ -6,7 +6,6 @@ import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -26,6 +25,7 @@ from msfp_gen.cli.console import (
     say,
     scenes,
     show,
+    with_field,
 )
 from msfp_gen.common.errors import RunError
 from msfp_gen.common.output import check_output, make_folder
@@ -226,7 +226,7 @@ def _report(
     scene = load_scene(name)
     require_meant(scene, force=force)
     if duration is not None:
-        scene = replace(scene, duration=duration)
+        scene = with_field(scene, "duration", lambda _: duration)
     if folder is not None:
         make_folder(folder, "--output")
     result = study(scene)

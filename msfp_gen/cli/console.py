@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 
-from msfp_gen.common.errors import RunError, printable
+from msfp_gen.common.errors import InputError, RunError, printable
 from msfp_gen.common.fields import Choice, Rule, ruled_fields
 from msfp_gen.results.sign import SIGNS
 from msfp_gen.specification.layout import Effects
@@ -276,6 +276,13 @@ def build(scene: System, gradients: bool = False) -> None:
 
 
 Force = Annotated[bool, typer.Option("--force", help="Run also with values that no unit can make right.")]
+
+
+def with_field(scene: Any, name: str, change: Callable[[Any], Any]) -> Any:
+    """A scene with a field changed by options. change: of its value. Raises InputError where there is no such field."""
+    if name not in scene.__dataclass_fields__:
+        raise InputError(f"{scene.name}: this system has no field {name}; leave out the options that change it")
+    return replace(scene, **{name: change(getattr(scene, name))})
 
 
 def run_scene(scene: Any, force: bool = False, **options: Any) -> tuple[Any, RunError | None]:

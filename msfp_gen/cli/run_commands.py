@@ -27,6 +27,7 @@ from msfp_gen.cli.console import (
     run_scene,
     say,
     show,
+    with_field,
 )
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.fields import to_si
@@ -252,14 +253,11 @@ def demo(
     say(f"\nwrote {output / 'accuracy.png'}")
 
 
-def _with_options(scene: System, duration: float | None, **solver: Any) -> System:
+def _with_options(scene: Any, duration: float | None, **solver: Any) -> Any:
     """`scene` with the duration and solver options of the command line."""
     changes = {name: value for name, value in solver.items() if value is not None}
-    for name, given in (("solver", changes), ("duration", duration is not None)):
-        if given and name not in scene.__dataclass_fields__:
-            raise InputError(f"{scene.name}: this system has no field {name}; leave out the options that change it")
-    scene = replace(scene, solver=replace(scene.solver, **changes)) if changes else scene
-    return scene if duration is None else replace(scene, duration=duration)
+    scene = with_field(scene, "solver", lambda solver: replace(solver, **changes)) if changes else scene
+    return scene if duration is None else with_field(scene, "duration", lambda _: duration)
 
 
 def _run(

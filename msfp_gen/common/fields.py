@@ -45,6 +45,12 @@ _ACCELERATION_NAMES = {"g": "standard_gravity", "gal": "Gal"}
 _PERCENT = {"%": 0.01, "percent": 0.01}
 
 
+def number_and_unit(text: str) -> tuple[float, str | None] | None:
+    """The number of a text such as "75 mm", and its unit, None without one. None for a text of another form."""
+    match = _TEXT.fullmatch(text)
+    return None if match is None else (float(match[1]), match[2])
+
+
 def to_si(text: str, unit: str) -> float:
     """The value of a quantity such as "75 mm", in SI.
 
@@ -57,10 +63,10 @@ def to_si(text: str, unit: str) -> float:
             adds the field and the value.
     """
     remedy = f"give a number [{unit}] or a text with a unit of [{unit}]" if unit else "give a plain number"
-    match = _TEXT.fullmatch(text)
-    if match is None:
+    parts = number_and_unit(text)
+    if parts is None:
         raise ValueError(f"this is no number with a unit; {remedy}")
-    number, unit_text = float(match[1]), match[2]
+    number, unit_text = parts
     if unit_text is None:
         raise ValueError(f"this text names no unit; {remedy}")
     if not unit:

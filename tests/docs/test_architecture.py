@@ -186,7 +186,7 @@ def test_few_functions_ask_for_the_kind_of_a_system():
     assert found == set(KIND_SWITCHES)
 
 
-def test_a_run_loads_the_core_alone(tmp_path):
+def test_a_run_loads_the_core_alone():
     """The model is in the cache: its build loads SymPy and Cython. The command adds its own package."""
     msfp_gen.simulate(msfp_gen.load_scene("fenz-test2"))
     code = "msfp_gen.simulate(msfp_gen.load_scene('fenz-test2'))"

@@ -89,7 +89,7 @@ def test_wrong_states_are_named(page):
 
 
 def test_ten_thousand_states_cost_what_the_c_code_costs(page):
-    """Checks, shapes and names of results take less than twice the time of the loop in C."""
+    """Checks, shapes and names of results take less than twice the time of the loop in C beside it."""
     model, bearing, top, tilts = page["model"], page["bearing"], page["top"], page["tilts"]
     h, base, load = np.zeros((len(tilts), 2, 2)), np.zeros((len(tilts), 3, 6)), np.zeros((len(tilts), 6))
     stack = model.stack(bearing, top)

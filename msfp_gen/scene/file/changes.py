@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from msfp_gen.common.aliases import SceneTable
 from msfp_gen.common.errors import InputError, prefixed
-from msfp_gen.common.fields import Quantity, ruled_fields
+from msfp_gen.common.fields import Quantity, number_and_unit, ruled_fields
 from msfp_gen.scene.bearing import Body, Surface
 from msfp_gen.scene.file.loader import MAX_DEPTH, complete_bearing, complete_part
 from msfp_gen.scene.file.schema import SCENE
@@ -18,7 +18,6 @@ from msfp_gen.scene.system import kinds
 
 Key = str | int | None  # of a table, of a list, of all rows of a list
 _STEP = re.compile(r"([^\[\].]+)((?:\[(?:\d+|\*)\])*)")
-_WITH_UNIT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([A-Za-z%°µ].*)")  # "75 mm"
 NO_TABLES: Mapping[str, Any] = MappingProxyType({})
 ROWS = {"surfaces": Surface, "bodies": Body}
 _COLUMNS = {  # a field of surfaces or bodies -> their list, and whether one value is a list of numbers
@@ -172,8 +171,8 @@ def _times(value: Any, factor: float) -> Any:
     """A number, one with its unit, or each of a list, times a factor."""
     if isinstance(value, list):
         return [_times(item, factor) for item in value]
-    if isinstance(value, str) and (match := _WITH_UNIT.fullmatch(value.strip())):
-        return f"{float(match[1]) * factor!r} {match[2]}"
+    if isinstance(value, str) and (parts := number_and_unit(value)) is not None and parts[1] is not None:
+        return f"{parts[0] * factor!r} {parts[1]}"
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"{value!r} is no number to multiply; set it, or give a number of bearing, top or solver")
     return value * factor
