@@ -166,6 +166,9 @@ def read_histories(path: str | Path, columns: str | Path | Mapping[str, Any] | N
         if own and name != "time" and text.removeprefix("-") not in [_split(cell)[0] for cell in tables[file].names]:
             continue
         found[name] = tables[file].column(text, QUANTITIES[name][0])
+    if own:
+        found |= {name: found[name] - found[name][0] for name in found if name.startswith("upper_")}  # of its position
+        found |= _slip_speeds(tables[path])
     rows = min(map(len, found.values()), default=0)
     if any(len(values) > rows + 1 for values in found.values()):  # recorders may write a row more or less
         counts = ", ".join(f"{name} {len(values)}" for name, values in found.items())
@@ -181,6 +184,17 @@ def read_histories(path: str | Path, columns: str | Path | Mapping[str, Any] | N
         None if mass is None else _quantity("mass", mass, "kg"),
         1.0 if bearings is None else _quantity("bearings", bearings, ""),
     )
+
+
+def _slip_speeds(table: TextTable) -> dict[str, Array]:
+    """Slip speeds of the surfaces in a CSV of this package, which has both components of the slip velocity."""
+    present = {_split(cell)[0] for cell in table.names}
+    found = {}
+    for i in range(1, 10):
+        names = [name for axis in (1, 2) if (name := f"slip_velocity_{i}_t~{axis}") in present]
+        if names:
+            found[f"slip_speed_{i}"] = np.linalg.norm([table.column(name, "m/s") for name in names], axis=0)
+    return found
 
 
 def histories_from(source: Any, columns: str | Path | Mapping[str, Any] | None = None) -> Histories:

@@ -216,8 +216,9 @@ def test_an_error_of_the_caller_ends_all_runs(processes: bool, monkeypatch: pyte
     begin = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
         simulate_batch([*endless(1), load_scene("fenz-test1")], workers=2, progress=interrupted)
-    assert time.perf_counter() - begin < 20.0
-    assert threading.active_count() == before
+    while threading.active_count() > before and time.perf_counter() - begin < 20.0:
+        time.sleep(0.01)  # the thread with which loky watches its processes ends after them
+    assert threading.active_count() == before and time.perf_counter() - begin < 20.0
 
 
 PROGRAM = """
