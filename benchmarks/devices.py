@@ -1,6 +1,6 @@
 """Compare one device of each kind with friction circles and published formulas: `python benchmarks/devices.py [DIR]`.
 
-Draws docs/figures/devices.png and fills the table of docs/devices.md. DIR is the folder to write to, with a copy of the
+Draws docs/figures/devices.png and fills the table of docs/bearing.md. DIR is the folder to write to, with a copy of the
 page in it; default: the docs of this checkout.
 """
 
@@ -225,10 +225,10 @@ def table() -> str:
 
 def write_table(folder: Path) -> None:
     """Replace the table of the page."""
-    text = (folder / "devices.md").read_text(encoding="utf-8")
+    text = (folder / "bearing.md").read_text(encoding="utf-8")
     before, rest = text.split(MARKS[0])
     after = rest.split(MARKS[1])[1]
-    with replacing(folder / "devices.md") as temporary:
+    with replacing(folder / "bearing.md") as temporary:
         temporary.write_text(labelled(before + MARKS[0] + table() + MARKS[1] + after), encoding="utf-8")
 
 

@@ -415,7 +415,7 @@ def slow_path(radius: float, friction: float, path: Array) -> Array:
 
 
 def device_points() -> Iterator[Series]:
-    """Single to quintuple pendulums pushed through all sliding regimes, at every displacement of docs/devices.md."""
+    """Single to quintuple pendulums pushed through all sliding regimes, at every displacement of docs/bearing.md."""
     for device in devices.DEVICES:
         rows = devices.rows(device)
         for column, source, kind in devices.references(device):

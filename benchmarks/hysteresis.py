@@ -1,4 +1,4 @@
-"""Hysteresis laws and contact damping: prints the tables of docs/hysteresis.md.
+"""Hysteresis laws and contact damping: prints the tables of docs/friction.md.
 
 `python benchmarks/hysteresis.py`: about two minutes.
 """

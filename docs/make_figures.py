@@ -28,7 +28,7 @@ from quick import docs_folder, parser, pick
 FOLDER = Path(__file__).resolve().parent / "figures"
 RECORD = "ridgecrest-2019-ci-clc"
 ROWS = pick(3000, 300)
-DEVICES = {  # preset scene -> name in docs/layouts.md
+DEVICES = {  # preset scene -> name in docs/bearing.md
     "single-push": "single",
     "single-articulated-push": "single, articulated",
     "double-push": "double",

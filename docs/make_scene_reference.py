@@ -76,7 +76,7 @@ MEANINGS = {
     "base_rim_radius": "Radius of the edge of the base that meets a rim, where the base is a slider.",
     "base_rim_offset": "Distance of that edge from its upper face.",
     "base_centroid": "Centre of mass of the base above its bottom (3.2); no result of a run depends on it.",
-    "sheet": "The data sheet of the bearing ([sheet.md](sheet.md)).",
+    "sheet": "The data sheet of the bearing ([bearing.md](bearing.md#what-follows-from-a-data-sheet)).",
     "device": "Kind of the bearing.",
     "bearing.sheet.sheet.radius": "R of each surface. Lists go from the bottom, of all surfaces or of the lower half.",
     "effective_radius": "R_eff, from the centre of the sphere to the pivot. Two of radius, this and height are given.",
@@ -101,14 +101,14 @@ MEANINGS = {
     "friction": "Friction coefficient.",
     "effects.friction": "What the friction coefficient depends on ([friction.md](friction.md)).",
     "yield_displacement": "Slip over which friction builds up; 0.25 to 1 mm in practice.",
-    "rim_stiffness": "Stiffness of the rim ([faq.md](faq.md#how-stiff-is-a-rim)).",
+    "rim_stiffness": "Stiffness of the rim ([bearing.md](bearing.md#how-stiff-is-a-rim)).",
     "rim_damping": "Damping of the rim.",
     "seat_stiffness": "Stiffness of the unilateral contact, with uplift; left out: 5e9, or more below a stiffer top "
     "([uplift.md](uplift.md#the-model)).",
     "seat_damping": "Damping of that contact, over its stiffness and compression.",
-    "contact_damping": "Damping time T of the sheared contact ([hysteresis.md](hysteresis.md)).",
+    "contact_damping": "Damping time T of the sheared contact ([friction.md](friction.md#friction-before-sliding)).",
     "friction_at": "What friction coefficients refer to: the surfaces, or the pivot as in data sheets"
-    " ([devices.md](devices.md)).",
+    " ([bearing.md](bearing.md#why-a-run-and-the-published-formulas-differ)).",
     **dict.fromkeys(
         (
             "friction_slow",

@@ -153,7 +153,7 @@ def _parameters(new: Maker) -> dict[str, Block]:
         .scalar("sc", "m", "s_c, sliding capacity (3.21)")
         .scalar("mu", "-", "friction coefficient (3.16)")
         .scalar("dy", "m", "yield displacement, R_0/R of (3.18)")
-        .scalar("td", "s", "T, damping time of the sheared contact (docs/hysteresis.md)")
+        .scalar("td", "s", "T, damping time of the sheared contact (docs/friction.md)")
         .scalar("kc", "N/m", "rim stiffness (3.23)")
         .scalar("cc", "N s/m", "rim damping (3.23)")
         .scalar("rs", "m", "radius of the slider that carries the contact patch")

@@ -1,4 +1,4 @@
-"""Effective stiffness, period and damping of a bearing by its published backbone, in closed form (docs/sheet.md)."""
+"""Effective stiffness, period and damping of a bearing by its published backbone, in closed form (docs/bearing.md)."""
 
 from __future__ import annotations
 

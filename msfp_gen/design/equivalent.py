@@ -1,4 +1,4 @@
-"""Equivalent lateral procedure: displacement and base shear of an isolated mass from a spectrum (docs/sheet.md).
+"""Equivalent lateral procedure: displacement and base shear of an isolated mass from a spectrum (docs/bearing.md).
 
 A bearing by its published backbone, a spectrum of 5 % damping and factors of damping come in; the displacement at which
 the effective properties give it again goes out.

@@ -1,4 +1,4 @@
-"""A data sheet and what follows from it, as tables: `msfp-gen sheet` (docs/sheet.md)."""
+"""A data sheet and what follows from it, as tables: `msfp-gen sheet` (docs/bearing.md)."""
 
 from __future__ import annotations
 

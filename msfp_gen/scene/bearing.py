@@ -39,7 +39,7 @@ class Surface:
     with its values in SI, is 1/d_y. rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103).
     seat_stiffness [N/m], seat_damping [s/m]: k and c of the unilateral contact of models with uplift, whose force is
     k (s + c abs(s) ds/dt) at compression s (docs/uplift.md); k = None: `standing.seat_stiffness`. contact_damping: T
-    [s]; friction is mu N (Y + T dY/dt) in place of mu N Y (docs/hysteresis.md). The remaining fields are parameters of
+    [s]; friction is mu N (Y + T dY/dt) in place of mu N Y (docs/friction.md). The remaining fields are parameters of
     friction laws (docs/friction.md) and of drilling moments: each is given if, and only if, the law of
     `Effects.friction` or the moment of `Effects.spin` has it. Raises InputError.
     """
@@ -164,7 +164,7 @@ class Bearing(Printed):
 
     @classmethod
     def from_sheet(cls, **sheet: Any) -> Bearing:
-        """The bearing of a data sheet, by the names of docs/sheet.md: `from_sheet(device="triple", ...)`.
+        """The bearing of a data sheet, by the names of docs/bearing.md: `from_sheet(device="triple", ...)`.
 
         Capacities, edges of the sliders, masses and moments of inertia follow from it; `replace` changes them. Raises
         InputError.
@@ -363,7 +363,7 @@ def friction_from_pivot(
 
     Published formulas let friction act at the pivot, the middle of the innermost slider, and not at the sliding
     surface. The coefficient of an outer surface in such a formula contains the lever arms of the inner ones:
-    docs/devices.md, "Which friction a data sheet means". With R_eff the distance from the sphere centre to the pivot
+    docs/bearing.md, "Which friction a data sheet means". With R_eff the distance from the sphere centre to the pivot
     and ' for the next surface towards the pivot: mu = (mu_pivot (R_eff - R_eff') + mu' R')/R.
 
     Args:

@@ -64,7 +64,7 @@ class Link:
 def series_links(bearing: Bearing, rims: bool, arms: bool) -> list[Link]:
     """Links of both chains, from the plates inwards. The pivot is the middle of the innermost slider.
 
-    arms: friction acts at the radius of its surface, not at the effective radius (docs/devices.md), so a surface slides
+    arms: friction acts at the radius of its surface, not at the effective radius (docs/bearing.md), so a surface slides
     from F = (mu R - mu' R')/(R_eff - R_eff') on, with ' for the next surface inwards.
     """
     layout, surfaces = bearing.layout, bearing.surfaces

@@ -1,4 +1,4 @@
-"""A bearing by its data sheet: `Sheet` comes in; the values of its surfaces and bodies go out (docs/sheet.md).
+"""A bearing by its data sheet: `Sheet` comes in; the values of its surfaces and bodies go out (docs/bearing.md).
 
 A sheet has radii, heights, diameters and friction; what a run needs beside them follows: the capacity of each surface,
 the edges of the sliders, masses and moments of inertia of steel. SI units throughout.

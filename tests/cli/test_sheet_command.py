@@ -1,4 +1,4 @@
-"""`msfp-gen sheet` prints and draws the data sheet of docs/sheet.md; its numbers by formulas written out."""
+"""`msfp-gen sheet` prints and draws the data sheet of docs/bearing.md; its numbers by formulas written out."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from support import ROOT
 
 from msfp_gen.cli import main
 
-PAGE = (ROOT / "docs" / "sheet.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "bearing.md").read_text(encoding="utf-8")
 Capture = pytest.CaptureFixture[str]
 
 
@@ -42,6 +42,15 @@ def test_prints_what_follows_by_hand(file: Path, capsys: Capture) -> None:
     assert f"displacement capacity {capacity * 1e3:.4g} mm" in printed
     force = 0.09 + (0.3 - second) / (2 * outer)
     assert f"300 {2500 * force:.4g} {2.5 * force / 0.3:.4g} {2 * pi * sqrt(0.3 / (9.8 * force)):.3f}" in printed
+
+
+def test_prints_what_the_page_shows(file: Path, capsys: Capture) -> None:
+    assert main(["sheet", str(file)]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    shown = re.search(r"```\n(bearing: .*?)```", PAGE, re.DOTALL)
+    assert shown
+    lines = shown[1].replace("nominal  ", "         ").splitlines()
+    assert len(lines) == 7 and not set(lines) - {line.replace("nominal  ", "         ") for line in printed}
 
 
 def test_bounds_and_numbers_as_json(file: Path, capsys: Capture) -> None:

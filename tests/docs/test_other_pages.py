@@ -1,4 +1,4 @@
-"""What docs/faq.md, docs/comparison.md and docs/layouts.md state is what runs and tables give."""
+"""What docs/bearing.md, docs/effects.md and docs/comparison.md state is what runs and tables give."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from support import ROOT
 from msfp_gen import load_scene, presets, simulate
 from msfp_gen.specification import contract
 
-FAQ, COMPARISON, LAYOUTS = (
-    (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("faq.md", "comparison.md", "layouts.md")
+BEARING, COMPARISON, EFFECTS = (
+    (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("bearing.md", "comparison.md", "effects.md")
 )
 
 
 @pytest.mark.parametrize("stiffness", [1, 10, pytest.param(100, marks=pytest.mark.slow)])
 def test_peak_force_and_compression_by_rim_stiffness(stiffness: int) -> None:
     """Test 5 of PEER 2017/07 with other rims, [MN/m]."""
-    row = re.search(rf"^\| {stiffness} MN/m[^|]*\| ([\d.]+) kN \| ([\d.]+) mm", FAQ, re.MULTILINE)
+    row = re.search(rf"^\| {stiffness} MN/m[^|]*\| ([\d.]+) kN \| ([\d.]+) mm", BEARING, re.MULTILINE)
     assert row
     scene = load_scene("fenz-test5")
     run = simulate(replace(scene, bearing=scene.bearing.replace(rim_stiffness=stiffness * 1e6)))
@@ -31,8 +31,8 @@ def test_peak_force_and_compression_by_rim_stiffness(stiffness: int) -> None:
     assert -1e3 * run.history.gap[:, 0].min() == pytest.approx(float(row[2]), rel=0.1)
 
 
-def test_the_monitors_of_the_questions_are_those_of_the_contract() -> None:
-    table = FAQ.split("| monitor in the note", 1)[1]
+def test_the_monitors_of_notes_are_those_of_the_contract() -> None:
+    table = EFFECTS.split("| monitor in the note", 1)[1].split("\n\n", 1)[0]
     named = set(re.findall(r"^\| `(\w+)`", table, re.MULTILINE))
     assert named - {"plane"} <= {word.name for word in contract.MONITORS}
 
@@ -56,7 +56,7 @@ def test_the_licence_is_that_of_the_project() -> None:
 def test_layouts_of_the_page_are_those_of_the_presets() -> None:
     """A preset named in a row has the layout of the row."""
     found = 0
-    for row in re.findall(r"^\|.*\|$", LAYOUTS, re.MULTILINE):
+    for row in re.findall(r"^\|.*\|$", BEARING, re.MULTILINE):
         layout = re.search(r"\((\d+), (\d+), (\d+)\)|(\d+)_(\d+)_(\d+)", row)
         for name in re.findall(r"`([\w-]+)`", row):
             if layout and name in presets.names("bearing"):

@@ -1,9 +1,10 @@
-"""What the README and the pages of commands and of Python show works as shown."""
+"""What the README and the page of commands and Python show works as shown."""
 
 import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,14 +13,14 @@ from support import ROOT
 from msfp_gen import load_scene
 from msfp_gen.cli import main
 
-README, COMMANDS, PYTHON, PAGES = (
-    (ROOT / name).read_text(encoding="utf-8")
-    for name in ("README.md", "docs/commands.md", "docs/python.md", "docs/pages.md")
-)
+README, COMMANDS = ((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/commands.md"))
+
+
+SITE = "".join(path.read_text(encoding="utf-8") for path in ROOT.glob("docs/site/*.md"))
 
 
 def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```$", README + PYTHON, flags=re.MULTILINE | re.DOTALL)
+    return re.findall(rf"^```{language}\n(.*?)^```$", README + COMMANDS, flags=re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.parametrize("code", blocks("python"), ids=lambda code: code.splitlines()[0][:60])
@@ -53,12 +54,29 @@ def test_every_command_is_listed(capsys):
     assert names == set(re.findall(r"^\| `msfp-gen (\w+)", COMMANDS, flags=re.MULTILINE))
 
 
+@cache
+def anchors(page):
+    """What links to the headings of a page may name, as GitHub and the site do."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    titles = (re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", title) for title in re.findall(r"^#+ (.*)$", text, re.MULTILINE))
+    return {re.sub(r"[^\w -]", "", title.lower()).strip().replace(" ", "-") for title in titles}
+
+
 def test_every_page_is_linked_and_every_link_leads_somewhere():
-    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")]
-    for page in pages:
-        for link in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
-            assert link.startswith("http") or (page.parent / link).exists(), f"{page.name}: {link}"
-    linked = set(re.findall(r"\(docs/(\w+)\.md", README)) | set(re.findall(r"\(([\w-]+)\.md", PAGES))
+    for page in (
+        *ROOT.glob("*.md"),
+        *ROOT.glob("docs/*.md"),
+        *ROOT.glob("benchmarks/*.md"),
+        *ROOT.glob("docs/site/*.md"),
+    ):
+        folder = ROOT if page.parent.name == "site" else page.parent  # the site is put together at the root
+        for link, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)\s]*))?\)", page.read_text(encoding="utf-8")):
+            if link.startswith(("http", "gallery/", "api/")):
+                continue
+            target = (folder / link).resolve() if link else page
+            assert target.exists(), f"{page.name}: {link}"
+            assert not anchor or anchor in anchors(target), f"{page.name}: {link}#{anchor}"
+    linked = set(re.findall(r"\(docs/(\w+)\.md", README)) | set(re.findall(r"\(docs/([\w-]+)\.md", SITE))
     assert linked == {page.stem for page in ROOT.glob("docs/*.md")}
 
 

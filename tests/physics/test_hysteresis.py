@@ -1,4 +1,4 @@
-"""Friction before and at sliding: contact damping, and the elastic-perfectly plastic law (docs/hysteresis.md)."""
+"""Friction before and at sliding: contact damping, and the elastic-perfectly plastic law (docs/friction.md)."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def eight(amplitude: float, count: int, across: float = 0.5) -> Array:
 
 def beginning(frictions: Sequence[float]) -> list[float]:
     """The coefficients at which a force begins to move each surface, in a stack pushed along one axis: (mu R - mu' R')/
-    (R - R'), with ' for the next surface inwards (docs/devices.md)."""
+    (R - R'), with ' for the next surface inwards (docs/bearing.md)."""
     inside = frictions[0] * RADII[0]
     outer = [(mu * r - inside) / (r - RADII[0]) for mu, r in zip(frictions[1:], RADII[1:], strict=True)]
     return [frictions[0], *outer]

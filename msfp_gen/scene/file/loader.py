@@ -145,7 +145,7 @@ def load_sheet(source: str | Path, kind: str | None = None) -> tuple[str, Sheet,
         kinds = {"": table.get("bearing"), **(of_building if isinstance(of_building, dict) else {})}
         found = {name: one for name, one in kinds.items() if isinstance(one, dict) and "sheet" in one}
         if not found:
-            raise InputError("bearing.sheet is missing: give the data sheet of the bearing (docs/sheet.md)")
+            raise InputError("bearing.sheet is missing: give the data sheet of the bearing (docs/bearing.md)")
         if (len(found) > 1) if kind is None else (kind not in found):
             names = ", ".join(name or "bearing" for name in found)
             raise InputError(f"--bearing = {kind or ''!r}: the file has the sheets of {names}; give one of these names")
