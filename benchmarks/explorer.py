@@ -1,4 +1,4 @@
-"""Time from the movement of a slider of the explorer to the end of the drawing: prints the table of docs/explorer.md.
+"""Time from the movement of a slider of the explorer to the end of the drawing: prints the table of docs/figures.md.
 
 The page runs in headless Chromium from a file, as in the tests. Each row is the median of the movements of one slider
 through its range near the middle. Needs ziglang, selenium, Chromium and its driver.

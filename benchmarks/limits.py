@@ -1,4 +1,4 @@
-"""What published designs ask of their bearings, and the verdicts of the hospital: prints the tables of docs/limits.md.
+"""What published designs ask of their bearings, and the verdicts of the hospital: prints the tables of docs/results.md.
 
 All preset scenes and examples run as they are. The preset hospitals run at lower bound, nominal and upper bound of the
 table `asce7`, under 1, 1.5 and 2 times their records: `python benchmarks/limits.py`; with `hospital` these alone.

@@ -1,4 +1,4 @@
-"""Draw the figures of chapter 4 of PEER 2017/07 and write docs/results.md: `python benchmarks/report_figures.py [DIR]`.
+"""Draw the figures of chapter 4 of PEER 2017/07 and write docs/peer-2017-07.md: `python benchmarks/report_figures.py [DIR]`.
 
 DIR is the folder to write to; default: the docs of this checkout.
 """
@@ -177,8 +177,8 @@ def main(docs: Path = ROOT / "docs") -> None:
     write_figures(run, figures)
     study = inertia_study.study()
     inertia_study.write(study, figures)
-    results_page.write(run, study, docs / "results.md")
-    print(f"figures in {figures}, page {docs / 'results.md'}")
+    results_page.write(run, study, docs / "peer-2017-07.md")
+    print(f"figures in {figures}, page {docs / 'peer-2017-07.md'}")
 
 
 if __name__ == "__main__":

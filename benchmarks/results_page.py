@@ -1,4 +1,4 @@
-"""Write docs/results.md from its template: all numbers and tables are computed from the runs."""
+"""Write docs/peer-2017-07.md from its template: all numbers and tables are computed from the runs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ EDGES = ("u_star", "u_star_star", "u_dr1", "u_dr4")  # between regimes I, II, II
 TAKES_PART = 0.05  # least share of all sliding of a surface that is listed
 PERIODIC = (*(f"fenz-test{number}" for number in range(1, 6)), "unusual-tfp")
 ORBITS = tuple(f"becker-{kind}-{a}" for kind in ("circle", "eight") for a in (125, 88, 50, 25, 12, 5))
-TEMPLATE = Path(__file__).with_name("results.md.in")
+TEMPLATE = Path(__file__).with_name("peer-2017-07.md.in")
 
 
 def table_42_row(key: str, ours: float, closed: float | None) -> tuple[str, ...]:

@@ -232,7 +232,7 @@ class BuildingResult(AnyResult):
         Keys that `Result.summary` has too: name, status, message, notes, duration, counters, wall_time,
         real_time_factor; peak_displacement: across any bearing [m]; peak_force: of the ground on all bearings, the base
         shear [N]; peak_force_ratio: radial, over the weight [-]; rims_met: numbers (from 1) of bearings in which a
-        slider reached its rim; verdict: demands on the bearings against their limits (docs/limits.md).
+        slider reached its rim; verdict: demands on the bearings against their limits (docs/results.md).
 
         Other keys:
 

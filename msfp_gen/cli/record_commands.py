@@ -110,7 +110,7 @@ def record(
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen suite suite.toml --spectrum suite.png")
 def suite(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A list of records (TOML): docs/data.md, Suites.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A list of records (TOML): docs/motion.md, Suites.")],
     spectrum: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the spectra, their mean and the target: .png, .svg, .pdf.")
     ] = None,

@@ -297,7 +297,7 @@ def limit_table(bounds: SuiteBounds, rows: Any) -> Table:
         values = (f"{worst[key] * scale:.4g} {unit}".rstrip() for key in ("value", "allowed"))
         shown.append((name.replace("_", " "), *cells, *values, worst["record"] if worst["share"] else "-"))
     columns = ("limit", *CASES, "largest", "allowed", "record")
-    return Table("share of every limit of the device that the worst run reached (docs/limits.md)", columns, shown)
+    return Table("share of every limit of the device that the worst run reached (docs/results.md)", columns, shown)
 
 
 def _reached(rows: Any) -> dict[str, dict[str, Any]]:

@@ -31,10 +31,10 @@ COMPARISONS = (
                ("physics/test_building_uplift.py",), "building"),
     Comparison("bounds of friction", "the rules of the codes by hand, as the literature quotes them; friction circles",
                "bounding", ("unit/studies/test_bounding.py",)),
-    Comparison("spectra of records", "closed forms and an independent integration", "data",
+    Comparison("spectra of records", "closed forms and an independent integration", "motion",
                ("unit/motions/records/test_spectrum.py",)),
     Comparison("capacities, backbone and effective properties of a data sheet", "published devices; formulas by hand",
-               "sheet", ("unit/scene/test_sheet.py", "cli/test_sheet_command.py"), "sheet"),
+               "bearing", ("unit/scene/test_sheet.py", "cli/test_sheet_command.py"), "sheet"),
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""`characterise`: cycles, first loading, demands and envelope of a run, as tables and CSV (docs/characterise.md)."""
+"""`characterise`: cycles, first loading, demands and envelope of a run, as tables and CSV (docs/results.md)."""
 
 from __future__ import annotations
 
@@ -330,7 +330,7 @@ NO_LOOP = "effective stiffness, damping, zero-displacement force and the sliding
 
 
 def characterise(one: Result) -> Characterisation:
-    """Characterise a run of one bearing; docs/characterise.md gives the formulas and the clauses of codes.
+    """Characterise a run of one bearing; docs/results.md gives the formulas and the clauses of codes.
 
     What the rows of a bearing below a building do not have is None, and the notes say so; its period is that with N at
     rest. Raises InputError if the bearing did not move.

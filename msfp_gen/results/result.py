@@ -172,7 +172,7 @@ class AnyResult(Printed):
 
     @cached_property
     def verdict(self) -> Verdict:
-        """What the device was asked to bear, against its limits (docs/limits.md)."""
+        """What the device was asked to bear, against its limits (docs/results.md)."""
         stopped = float(self.bearings[0].history.time[-1]) if self.status == "stopped" else None
         failure = "" if self.succeeded else self.status_text
         whole = self.scene.fidelity == "equivalent"
@@ -424,7 +424,7 @@ class Result(AnyResult):
         return [surface_table(self.summary, self.bearing.surfaces), *more]
 
     def characterise(self) -> Characterisation:
-        """Effective stiffness, damping, sliding regimes, remaining capacity, velocity and heat (docs/characterise.md).
+        """Effective stiffness, damping, sliding regimes, remaining capacity, velocity and heat (docs/results.md).
 
         What the rows of a bearing of a building do not have is None, and the notes say so. Raises InputError where the
         bearing did not move.
@@ -482,7 +482,7 @@ def _scaled(values: Array, size: float) -> Array:
 
 
 def characterise(result: Any) -> Any:
-    """The characterisation of a run, of one bearing or of a building; docs/characterise.md and docs/buildings.md.
+    """The characterisation of a run, of one bearing or of a building; docs/results.md and docs/buildings.md.
 
     Raises InputError where nothing moved.
     """

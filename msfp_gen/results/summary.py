@@ -125,7 +125,7 @@ def summarise(result: Result) -> dict[str, Any]:
             (`Bearing.friction_at_pivot`); None where there are none [-].
         peak_rim_force: [N].
         uplift: of all surfaces together, see `uplift_of`.
-        verdict: what the device was asked to bear, against its limits; see `Verdict.as_dict` and docs/limits.md.
+        verdict: what the device was asked to bear, against its limits; see `Verdict.as_dict` and docs/results.md.
         rims_met: surfaces (1..n-1) that reached their rim.
         times: when each peak was reached first [s]: peak_displacement, peak_force and the keys of extremes of surfaces,
             each in the shape of its values.

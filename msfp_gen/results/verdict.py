@@ -1,4 +1,4 @@
-"""The verdict of a run: what the device was asked to bear, against its limits (docs/limits.md)."""
+"""The verdict of a run: what the device was asked to bear, against its limits (docs/results.md)."""
 
 from __future__ import annotations
 

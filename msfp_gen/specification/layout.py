@@ -76,7 +76,7 @@ class Effects:
     """Physical effects that the equations include. Every field takes one of the listed values, each with its meaning.
 
     Options of the command line, their help, scene files and names of models are generated from these fields. For
-    friction, uplift and top_rotation see docs/friction.md, docs/uplift.md and docs/loads.md.
+    friction, uplift and top_rotation see docs/friction.md, docs/uplift.md and docs/motion.md.
 
     Raises:
         InputError: a value is not permitted, the values exclude each other, or `friction_law` is not a valid formula.

@@ -76,7 +76,7 @@ def test_every_page_is_linked_and_every_link_leads_somewhere():
             target = (folder / link).resolve() if link else page
             assert target.exists(), f"{page.name}: {link}"
             assert not anchor or anchor in anchors(target), f"{page.name}: {link}#{anchor}"
-    linked = set(re.findall(r"\(docs/(\w+)\.md", README)) | set(re.findall(r"\(docs/([\w-]+)\.md", SITE))
+    linked = set(re.findall(r"\(docs/([\w-]+)\.md", README)) | set(re.findall(r"\(docs/([\w-]+)\.md", SITE))
     assert linked == {page.stem for page in ROOT.glob("docs/*.md")}
 
 

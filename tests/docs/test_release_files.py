@@ -29,7 +29,7 @@ FIGURES = {
     "within 0.2 of theory": ("verification", "observed orders are within 0.2 of it"),
     "1828 comparisons": ("validation", "1828 comparisons"),
     "1767 of them": ("validation", "1767 of them within the tolerance"),
-    "hundreds to thousands of hertz": ("faq", "hundreds to thousands of hertz"),
+    "hundreds to thousands of hertz": ("glossary", "at hundreds to thousands of hertz"),
 }
 
 

@@ -89,7 +89,7 @@ def test_study_reports_the_run_that_failed(tmp_path):
 @pytest.mark.slow
 def test_everything_is_regenerated(tmp_path):
     report_figures.main(tmp_path)
-    page = (tmp_path / "results.md").read_text(encoding="utf-8")
+    page = (tmp_path / "peer-2017-07.md").read_text(encoding="utf-8")
     named = {part.split(")")[0] for part in page.split("](figures/")[1:]}
     assert named == {path.name for path in (tmp_path / "figures").iterdir()}
     assert "{" not in page and "nan" not in page

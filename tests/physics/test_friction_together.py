@@ -125,7 +125,7 @@ def test_heat_is_taken_in_on_the_way() -> None:
 
 @pytest.mark.parametrize("word", thinned(LAWS, lambda word: word != "velocity"))
 def test_heat_of_the_surfaces_is_the_energy_that_friction_loses(word: str) -> None:
-    """And a little more: the heat that engineers sign off counts elastic slip as well (docs/characterise.md)."""
+    """And a little more: the heat that engineers sign off counts elastic slip as well (docs/results.md)."""
     run = run_under(word)
     uses = run.characterise().surfaces
     area = [np.pi * run.scene.bearing.slider_rim_radius(i) ** 2 for i in range(4)]

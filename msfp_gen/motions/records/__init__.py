@@ -72,7 +72,7 @@ def read_record(
     """Read a record from one file, or from several files of one recording.
 
     The format is recognised from the content: CSMIP and COSMOS V1 and V2, PEER .AT2, .VT2 and .DT2, K-NET and KiK-net,
-    and CSV with units in its header (docs/data.md). Files compressed by gzip are decompressed. The components are
+    and CSV with units in its header (docs/motion.md). Files compressed by gzip are decompressed. The components are
     assigned to E1, E2, E3 by their azimuths, in a right-handed frame; where a file has none, by the order of the files.
 
     Args:

@@ -179,7 +179,7 @@ def lines_of(path: Path, content: bytes) -> Lines:
     if not content.strip():
         raise InputError(f"{path.name}: the file is empty; give a record")
     if b"\0" in content:
-        raise InputError(f"{path.name}: a binary file; give a text file of a known format (docs/data.md)")
+        raise InputError(f"{path.name}: a binary file; give a text file of a known format (docs/motion.md)")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

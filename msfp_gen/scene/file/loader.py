@@ -1,6 +1,6 @@
 """Reading and writing of scene files (TOML), and of suites of ground motions. A file is data: nothing is evaluated.
 
-A suite lists records, and how they are scaled to a mean spectrum (docs/data.md).
+A suite lists records, and how they are scaled to a mean spectrum (docs/motion.md).
 """
 
 from __future__ import annotations

@@ -361,7 +361,7 @@ def bounding_tables(bounds: Bounds) -> list[Table]:
     unknown = [(bounds.compared[name].words(name), why) for name, why in bounds.undefined().items()]
     extra = [Table("runs that failed", (), failed)] if failed else []
     extra += [Table("what is not defined, and why", (), unknown)] if unknown else []
-    verdicts = Table("verdicts: limits of the device (docs/limits.md)", (), list(bounds.verdicts().items()))
+    verdicts = Table("verdicts: limits of the device (docs/results.md)", (), list(bounds.verdicts().items()))
     return [_factor_table(bounds.table), _lambda_table(bounds), _quantity_table(bounds), verdicts, *extra]
 
 

@@ -337,7 +337,7 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
         Table(f"{_counted(bounds)} at bounds by {bounds.factors}: means and worst values", columns, rows),
         Table("of which records the numbers are", (), means),
         Table("what has no mean, and why", (), undefined),
-        Table("limits of the device that runs exceeded (docs/limits.md)", (), exceeded),
+        Table("limits of the device that runs exceeded (docs/results.md)", (), exceeded),
         Table("runs that met the stop condition of the scene", (), stopped),
         Table("runs that failed; of several for the same reason the first message", (), failed),
     ]

@@ -1,4 +1,4 @@
-"""docs/limits.md says what runs give: the verdicts of the hospital, the keys, and what scenes reach."""
+"""docs/results.md says what runs give: the verdicts of the hospital, the keys, and what scenes reach."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import pytest
 from support import ROOT
 
 from msfp_gen import Limits, load_scene
+from msfp_gen.cli import main
 from msfp_gen.results.verdict import LIMITS
 
 sys.path.append(str(ROOT / "benchmarks"))
 import limits
 
-PAGE = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
 ROWS = [[cell.strip() for cell in line.split("|")[1:-1]] for line in PAGE.splitlines() if line.startswith("| C")]
 LONG = 21.0  # of the runs of single rows: rims are met before [s]
 SHORT = [("CCC", scale, "lower") for scale in ("1", "2")]
@@ -67,6 +68,14 @@ def test_scenes_reach_what_the_page_says() -> None:
         assert rims == f"{values['rims']:.0f} of {values['surfaces']:.0f}"
         assert values["force"] == pytest.approx(float(force), abs=0.006)
         assert values["temperature"] == pytest.approx(float(temperature), abs=0.6)
+
+
+def test_commands_print_what_the_page_shows(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    saved = str(tmp_path / "out.nc")
+    assert main(["run", "fenz-test5", "-o", saved]) == 0 and main(["characterise", saved]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    shown = PAGE.split("```text\n")[1].split("```")[0].splitlines()
+    assert len(shown) == 6 and set(shown) <= set(printed)
 
 
 def test_the_page_has_every_limit() -> None:
