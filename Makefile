@@ -32,7 +32,7 @@ lint: $(STAMP)
 types: $(STAMP)
 	$(BIN)/mypy
 
-# gcc -fanalyzer, clang-tidy and cppcheck on the C code, as a compiler reads it. See docs/checks.md.
+# gcc -fanalyzer, clang-tidy and cppcheck on the C code, as a compiler reads it. See docs/extending.md.
 analyse: $(STAMP)
 	$(BIN)/python tools/analyse.py
 
@@ -65,7 +65,7 @@ clang: $(STAMP)
 zig: $(ZIG)
 	$(BIN)/python -m pytest -q -n auto --dist loadfile tests/unit/jit/test_zig.py tests/unit/embedding/test_targets.py tests/unit/report/test_explorer_browser.py tests/unit/report/test_problem.py
 
-# Random scenes against each other: half an hour. See docs/stability.md.
+# Random scenes against each other: half an hour. See docs/robustness.md.
 fuzz: $(STAMP)
 	$(BIN)/python tools/fuzz.py --scenes 10000 --seed 1
 	$(BIN)/python tools/fuzz.py --combined --scenes 2000 --seed 127 --check 0

@@ -1,4 +1,4 @@
-"""Errors of straightforward code in difficult cases: the third column of docs/stability.md.
+"""Errors of straightforward code in difficult cases: the third column of docs/robustness.md.
 
 Each function is a short program as one would first write it, and returns its measured error as text. None uses msfp-gen.
 `python benchmarks/naive.py` prints one line per case.

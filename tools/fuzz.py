@@ -1,4 +1,4 @@
-"""The fuzz campaign of docs/stability.md: random valid scenes, run in a process that can be killed.
+"""The fuzz campaign of docs/robustness.md: random valid scenes, run in a process that can be killed.
 
     python tools/fuzz.py --scenes 10000 --seed 1
 

@@ -1,4 +1,4 @@
-"""The fuzz campaign in a short version; `python tools/fuzz.py` is the whole of it (docs/stability.md)."""
+"""The fuzz campaign in a short version; `python tools/fuzz.py` is the whole of it (docs/robustness.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What docs/stability.md says of naive code is what benchmarks/naive.py finds."""
+"""What docs/robustness.md says of naive code is what benchmarks/naive.py finds."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def words(text: str) -> str:
     "case", thinned(naive.CASES, lambda case: case is not naive.unrolled_expressions), ids=lambda case: case.__name__
 )
 def test_naive_code_still_fails_as_the_page_says(case: Callable[[], str]) -> None:
-    assert words(case()).strip() in words((ROOT / "docs" / "stability.md").read_text(encoding="utf-8"))
+    assert words(case()).strip() in words((ROOT / "docs" / "robustness.md").read_text(encoding="utf-8"))
 
 
 def test_naive_code_is_wrong_where_the_page_says_so() -> None:
