@@ -20,7 +20,7 @@ author = "The msfp-gen developers"
 copyright = author
 version = release = __version__
 
-sys.path.insert(0, str(Path(__file__).parent))  # figure_scraper, excerpts
+sys.path.insert(0, str(Path(__file__).parent))  # gallery_settings, excerpts
 import excerpts  # noqa: E402
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
@@ -30,7 +30,7 @@ root_doc = "index"
 exclude_patterns = [
     "search_texts.js.in",
     "**/GALLERY_HEADER.rst",
-    "gallery_scripts/**",
+    "examples/**",
     "**/sg_execution_times.rst",
     "sg_execution_times.rst",
 ]
@@ -42,8 +42,8 @@ html_theme_options: dict[str, Any] = {
     "navigation_with_keys": False,
     "show_nav_level": 1,
     "show_prev_next": False,
-    # Pages of one wide table use the whole width.
-    "secondary_sidebar_items": {"**": ["page-toc"], "docs/validation": [], "docs/comparison": []},
+    # Pages of one wide table, and the gallery, use the whole width.
+    "secondary_sidebar_items": {"docs/validation": [], "docs/comparison": [], "gallery/**": []},
     "header_links_before_dropdown": 8,
     "footer_start": ["copyright"],
     "footer_end": [],
@@ -64,20 +64,24 @@ python_use_unqualified_type_names = True
 default_role = "code"
 nitpicky = False
 
+SECTIONS = [f"examples/gallery/{name}" for name in ("bearings", "design", "buildings", "equations", "programs")]
 sphinx_gallery_conf = {
-    "examples_dirs": "gallery_scripts",
+    "examples_dirs": "examples/gallery",
     "gallery_dirs": "gallery",
-    "filename_pattern": r"plot_",
+    "filename_pattern": r"\.py$",
     "remove_config_comments": True,
     "show_memory": False,
+    "thumbnail_size": (480, 336),
     "show_signature": False,
     "download_all_examples": False,
     "min_reported_time": 1e9,
     "write_computation_times": False,
     "abort_on_example_error": True,
-    "within_subsection_order": "FileNameSortKey",
+    "subsection_order": SECTIONS,
+    "within_subsection_order": "gallery_settings.Order",
     "capture_repr": ("_repr_html_", "__repr__"),
-    "image_scrapers": ("matplotlib", "figure_scraper.figures"),
+    "image_scrapers": ("matplotlib", "gallery_settings.figures"),
+    "reset_modules": ("matplotlib", "gallery_settings.style"),
 }
 
 

@@ -13,6 +13,7 @@ import pytest
 from support import ROOT
 
 SITE = ROOT / "docs" / "site"
+EXAMPLES = ROOT / "examples" / "gallery"
 NEEDED = ("sphinx", "myst_parser", "pydata_sphinx_theme", "sphinx_gallery", "latex2mathml")
 MISSING = [name for name in NEEDED if importlib.util.find_spec(name) is None]
 needs_sphinx = pytest.mark.skipif(bool(MISSING), reason=f"the extra 'docs' is not installed ({', '.join(MISSING)})")
@@ -95,6 +96,15 @@ def build(folder: Path, *options: str) -> None:
     assert not run.stderr
 
 
+@needs_sphinx
+def test_every_example_has_a_place_in_its_section(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(SITE)
+    order = importlib.import_module("gallery_settings").ORDER
+    assert len(order) == len(set(order)) and set(order) == {path.stem for path in EXAMPLES.rglob("*.py")}
+    titles = [path.read_text(encoding="utf-8")[3:].splitlines()[:2] for path in EXAMPLES.rglob("*.py")]
+    assert all(len(title) == len(line) <= 62 and set(line) == {"="} for title, line in titles)
+
+
 @pytest.mark.slow
 @needs_sphinx
 def test_site_is_built_without_a_warning(tmp_path: Path) -> None:
@@ -107,11 +117,12 @@ def test_site_is_built_without_a_warning(tmp_path: Path) -> None:
 def test_gallery_runs_every_example(tmp_path: Path) -> None:
     build(tmp_path / "site")
     check_site(tmp_path / "site")
-    examples = {path.stem for path in (ROOT / "examples").iterdir() if path.suffix in (".toml", ".ipynb")}
-    examples |= {path.stem for path in (ROOT / "examples").glob("*.py") if "# %%" in path.read_text(encoding="utf-8")}
-    shown = {path.stem.removeprefix("plot_") for path in (tmp_path / "site" / "gallery").glob("plot_*.html")}
-    assert examples | {"building", "pareto", "sobol"} == shown
-    for path in (tmp_path / "site" / "gallery").glob("plot_*.html"):
-        page = path.read_text(encoding="utf-8")
-        assert f"_images/sphx_glr_{path.stem}_001.png" in page, f"{path.name} has no figure"
+    examples = {path.relative_to(EXAMPLES).with_suffix("") for path in EXAMPLES.rglob("*.py")}
+    pages = tmp_path / "site" / "gallery"
+    shown = {path.relative_to(pages).with_suffix("") for path in pages.rglob("*.html") if path.stem != "index"}
+    assert shown == examples
+    for example in examples:
+        page = (pages / example).with_suffix(".html").read_text(encoding="utf-8")
+        assert f"_images/sphx_glr_{example.name}_001.png" in page, f"{example} has no figure"
         assert str(ROOT) not in page, "a path of this machine"
+        assert f"{example.name}.ipynb" in page and f"{example.name}.py" in page

@@ -251,7 +251,7 @@ def test_example_derives_stiffness_and_frequencies(capsys):
     import matplotlib as mpl
 
     mpl.use("agg")
-    found = runpy.run_path(str(ROOT / "examples" / "stiffness.py"))
+    found = runpy.run_path(str(ROOT / "examples" / "gallery" / "equations" / "stiffness.py"))
     text = capsys.readouterr().out
     want = small_oscillations(found["bearing"], found["top"])
     for one, other in zip(("mass", "hanging", "friction"), want, strict=True):

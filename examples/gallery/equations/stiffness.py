@@ -3,7 +3,7 @@
 
 What is the stiffness of a triple friction pendulum below a mass, before it slides and without friction, and how fast do
 its light sliders vibrate? The equations of motion of PEER Report 2017/07 answer this in symbols: they are linearised at
-rest, and positions and sizes of the normal forces are eliminated. ``python examples/stiffness.py``
+rest, and positions and sizes of the normal forces are eliminated.
 """
 
 from __future__ import annotations
