@@ -121,6 +121,7 @@ PLACES = {"j": "γ", "j+1": "γ+1", "base": "1", "top": "n", "slider": "slider"}
 TITLES = {
     "body_block": "Distances along the axis, from (3.2)-(3.11)",
     "forward": "Kinematics of a body from the body below: (2.1)-(2.6), (3.4)-(3.12), and rates with (2.36)",
+    "contact_angles": "Angles of the normal's position (2.85)",
     "gap": "Sliding and gap (3.20), (3.21)",
     "rim": "Rim contact (3.20)-(3.25), applied only while it pushes",
     "spring_stage": "The spring below a supported mass: constants of its stage formula",

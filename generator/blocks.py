@@ -103,6 +103,7 @@ class Blocks:
     rim_coordinates: Block
     rim_wrench: Block
     split: Block
+    contact_angles: Block
     gap: Block
     top_wrench: Block
     foot_previous: Block
@@ -353,6 +354,10 @@ def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
         "rim_wrench": new("rim_wrench")
         .vector("F", "N", "F_c on the body above, along E1, E2, E3", POLAR)
         .vector("T", "N m", "F_c x delta: moment on the slider about its sphere centre, beside that of the rim", AXIAL)
+        .build(),
+        "contact_angles": new("contact_angles")
+        .scalar("psi", "rad", "psi~, first angle of the normal's position (2.85)", 0)
+        .scalar("theta", "rad", "theta~, second angle of the normal's position")
         .build(),
         "gap": new("gap").scalar("s", "m", "sliding displacement (3.20)").scalar("g", "m", "gap (3.21)").build(),
         "unilateral_depth": new("unilateral_depth")

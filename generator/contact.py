@@ -193,13 +193,24 @@ def surface_moment(b: Blocks, rims: bool) -> Program:
     return p
 
 
+def contact_angles(b: Blocks) -> Program:
+    """The angles of the normal's position from their sines and cosines."""
+    p = Program("contact_angles", "psi~ and theta~ of a contact (2.85)")
+    c: Symbols = p.read(b.contact, "c")
+    angles = {"psi": ArcTan2(c["sp"], c["cp"]) if c["sp"] != 0 else sp.Integer(0), "theta": ArcTan2(c["st"], c["ct"])}
+    p.write(b.contact_angles, angles)
+    return p
+
+
 def gap(b: Blocks) -> Program:
     """Sliding displacement (3.20) and gap (3.21); the arccos is written as an atan2, which is exact at zero tilt."""
     p = Program("gap", "sliding displacement and gap (3.20), (3.21)")
     par: Symbols = p.read(b.surface_parameters, "par")
-    above: Symbols = p.read(b.body, "a")
-    sine = p.let(norm(above["st"], p.let(above["sp"] * above["ct"])))
-    s = p.let(par["R"] * ArcTan2(sine, p.let(above["cp"] * above["ct"])))
+    x: Symbols = p.read(b.coordinates, "x")
+    sin_psi, cos_psi = p.let(sp.sin(x["psi"])), p.let(sp.cos(x["psi"]))
+    sin_theta, cos_theta = p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))
+    sine = p.let(norm(sin_theta, p.let(sin_psi * cos_theta)))
+    s = p.let(par["R"] * ArcTan2(sine, p.let(cos_psi * cos_theta)))
     p.write(b.gap, {"s": s, "g": par["sc"] - s})
     return p
 

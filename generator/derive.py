@@ -81,6 +81,7 @@ def derive(spec: ModelSpec) -> Equations:
         top.resting_foot(blocks),
         top.foot(blocks),
         top.top_energy(blocks),
+        contact.contact_angles(blocks),
         contact.gap(blocks),
         *energy.programs(blocks, effects.rims, effects.uplift, effects.top_rotation),
         *(two_port.programs(blocks) if effects.permits_moving_ends else ()),

@@ -135,6 +135,7 @@ SYMBOLS: dict[str, dict[str, str]] = {
     "top_moment": {"M": r"M_{E,#}"},
     "top_wrench": {"F": r"P_{@,#}", "M": r"M_{@,#}"},
     "rim": {"f": r"F_{c@,#}", "M": r"M_{c@,#}", "g": r"g_{@}", "dg": r"\dot{g}_{@}", "fc": r"F_{c@}"},
+    "contact_angles": {"psi": r"\tilde{\psi}_{@}", "theta": r"\tilde{\theta}_{@}"},
     "gap": {"s": r"s_{@}", "g": r"g_{@}"},
     "base_motion": {"O": "u_{g#}", "U": r"\dot{u}_{g#}", "B": r"\ddot{u}_{g#}"},
     "friction_power": {"stored": r"\dot{E}_{f@}", "damped": r"D_{c@}", "lost": r"D_{f@}"},
@@ -165,7 +166,8 @@ LOCAL_KINDS = {"contact_frame", "relative", "local_moment", "contact", "report_c
 PLACES: dict[str, dict[str, str]] = {
     "body_block": {"b": "k", "s": "k", "out": "k"},
     "forward": {"par": "k", "u": "k-1", "x": "k", "out": "k"},
-    "gap": {"par": r"\gamma", "a": r"\gamma+1", "out": r"\gamma"},
+    "contact_angles": {"c": r"\gamma", "out": r"\gamma"},
+    "gap": {"par": r"\gamma", "x": r"\gamma+1", "out": r"\gamma"},
     "rim": {"par": r"\gamma", "x": r"\gamma+1", "out": r"\gamma"},
     "interface_force": {"par": "k", "b": "k", "up": "k", "out": "k-1"},
     "surface_local": {

@@ -212,6 +212,7 @@ LISTS: Mapping[str, List] = {
     "held": List("moment", "held"),
     "lower": List("end_wrench", "lower"),
     "upper": List("end_wrench", "upper"),
+    "contact_angles": List("contact_angles", "contact_angles", per=Per.SURFACE),
     "gap": List("gap", "gap", per=Per.SURFACE),
     "resting_foot": List("resting_foot", "resting_foot"),
     "friction_end": List("friction_end", "friction_end", per=Per.SURFACE),
@@ -494,7 +495,7 @@ def two_port(effects: Effects) -> Schedule:
     """The ends of a two-port: load and support of the top plate; after an evaluation the wrenches of the ends."""
     moment = "below[base]" if effects.uplift else "moment[base]"
     support = (Call("upright", ("support",), ("upright",)),) if effects.top_rotation else ()
-    sliding = Call("gap", ("surface_parameters[j]", "body[j+1]"), ("gap[j]",), If({"gap": When.OFF_CENTRE}))
+    sliding = Call("gap", ("surface_parameters[j]", "x[j+1]"), ("gap[j]",), If({"gap": When.OFF_CENTRE}))
     return {
         "interface": (
             Pass(Over.TOP, (Call("interface_load", ("top_parameters", "far_end"), ("load_force",)), *support)),
@@ -539,7 +540,10 @@ def beside(effects: Effects) -> Schedule:
         "gaps": (
             Pass(
                 Over.SURFACES,
-                (Call("gap", ("surface_parameters[j]", "body[j+1]"), ("gap[j]",), replace(by, gives_results=True)),),
+                (
+                    Call("gap", ("surface_parameters[j]", "x[j+1]"), ("gap[j]",), replace(by, gives_results=True)),
+                    Call("contact_angles", ("contact[j]",), ("contact_angles[j]",), by),
+                ),
             ),
         ),
     }

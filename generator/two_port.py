@@ -27,13 +27,6 @@ from .lower import (
 from .program import ZERO, Program, Statement, Symbols, add, cross, dot, scale, subtract
 
 
-def _angle(p: Program, sine: sp.Expr, cosine: sp.Expr) -> sp.Expr:
-    """The angle of a sine and a cosine; its rate is cosine times rate of sine less sine times rate of cosine."""
-    angle = p.let(ArcTan2(sine, cosine))
-    p.rates[angle] = p.let(cosine * p.rate(sine) - sine * p.rate(cosine))
-    return angle
-
-
 def _angles(p: Program, t: Symbols) -> dict[str, sp.Expr]:
     """psi, theta, phi (2.1) of the rotation vector, with the rates of their statements declared."""
     p.declare_rates(t["r"], t["r1"])
@@ -46,11 +39,10 @@ def _angles(p: Program, t: Symbols) -> dict[str, sp.Expr]:
     upright, aside = p.let(cosine + versine * z**2), p.let(sine * x - versine * y * z)
     cos_square = p.let(first**2 + across**2)
     cos_theta = p.let(sp.sqrt(cos_square))
-    p.rates[cos_theta] = p.let(p.rate(cos_square) / (2 * cos_theta))
     return {
-        "psi": _angle(p, p.let(aside / cos_theta), p.let(upright / cos_theta)),
-        "theta": _angle(p, p.let(versine * x * z + sine * y), cos_theta),
-        "phi": _angle(p, p.let(across / cos_theta), p.let(first / cos_theta)),
+        "psi": p.let(ArcTan2(p.let(aside / cos_theta), p.let(upright / cos_theta))),
+        "theta": p.let(ArcTan2(p.let(versine * x * z + sine * y), cos_theta)),
+        "phi": p.let(ArcTan2(p.let(across / cos_theta), p.let(first / cos_theta))),
     }
 
 

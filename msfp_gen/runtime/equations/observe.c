@@ -103,7 +103,7 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
                  msfp_row *row)
 {
     msfp_blocks s;
-    double sliding[MSFP_GAP_SIZE];
+    double sliding[MSFP_GAP_SIZE], angles[MSFP_CONTACT_ANGLES_SIZE];
     memcpy(row->q, at->q, sizeof row->q);
     memcpy(row->v, at->v, sizeof row->v);
     memcpy(row->a, at->a, sizeof row->a);
@@ -111,9 +111,10 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
     for (int j = 0; j < NB; ++j) {
         const double *contact = w->contact[j];
         row->normal[j] = contact[MSFP_CONTACT_N];
-        row->angles[j][0] = MSFP_PLANAR ? 0.0 : msfp_angle(msfp_contact_sp(contact), msfp_contact_cp(contact));
-        row->angles[j][1] = msfp_angle(contact[MSFP_CONTACT_ST], contact[MSFP_CONTACT_CT]);
-        msfp_gap(p->surface[j], w->body[j + 1], sliding);
+        msfp_contact_angles(contact, angles);
+        row->angles[j][0] = msfp_contact_angles_psi(angles);
+        row->angles[j][1] = angles[MSFP_CONTACT_ANGLES_THETA];
+        msfp_gap(p->surface[j], w->x[j + 1], sliding);
         row->sliding[j] = sliding[MSFP_GAP_S];
         row->gap[j] = MSFP_UPLIFT && MSFP_RIMS ? w->rim_gap[j] : sliding[MSFP_GAP_G];
         row->rim[j] = w->rim_active[j] ? -w->rim[j][MSFP_RIM_FC] : 0.0;

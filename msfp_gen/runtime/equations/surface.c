@@ -47,14 +47,12 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
 
 void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE])
 {
-    double body[MSFP_BODY_SIZE];
+    double x[MSFP_COORDINATES_SIZE] = { 0.0 };
     for (int j = 0; j < NB; ++j) {
 #if !MSFP_PLANAR
-        body[MSFP_BODY_SP] = msfp_sin(q[j][0]);
-        body[MSFP_BODY_CP] = msfp_cos(q[j][0]);
+        x[MSFP_COORDINATES_PSI] = q[j][0];
 #endif
-        body[MSFP_BODY_ST] = msfp_sin(q[j][1]);
-        body[MSFP_BODY_CT] = msfp_cos(q[j][1]);
-        msfp_gap(p->surface[j], body, sliding[j]);
+        x[MSFP_COORDINATES_THETA] = q[j][1];
+        msfp_gap(p->surface[j], x, sliding[j]);
     }
 }

@@ -10,13 +10,13 @@
 #if MSFP_GRADIENTS
 #include "msfp_directions.h"
 
-/* Columns of sliding displacement and gap from the block of the body above. The sliding displacement has a kink at the
- * centre, where its columns are zero. */
-MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double *above, const double *dabove,
+/* Columns of sliding displacement and gap from the coordinates of the body above. The sliding displacement has a kink at
+ * the centre, where its columns are zero. */
+MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double *x, const double *dx,
                              const double *sliding, msfp_columns *gap)
 {
     double d[MSFP_GAP_SIZE * C];
-    msfp_gap_direction(par, above, sliding, dpar, dabove, d);
+    msfp_gap_direction(par, x, sliding, dpar, dx, d);
     const int centred = sliding[MSFP_GAP_S] == 0.0;
     for (int c = 0; c < C; ++c) {
         gap[MSFP_GAP_S][c] = centred ? 0.0 : d[MSFP_GAP_S * C + c];
@@ -29,24 +29,16 @@ MSFP_WIDE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_
                                  double sliding[MSFP_NB][MSFP_GAP_SIZE],
                                  msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE])
 {
-    double body[MSFP_BODY_SIZE] = { 0 }, d[MSFP_BODY_SIZE * C] = { 0 };
+    double x[MSFP_COORDINATES_SIZE] = { 0 }, d[MSFP_COORDINATES_SIZE * C] = { 0 };
     for (int j = 0; j < NB; ++j) {
-        body[MSFP_BODY_ST] = msfp_sin(q[j][1]);
-        body[MSFP_BODY_CT] = msfp_cos(q[j][1]);
-        for (int c = 0; c < C; ++c) {
-            d[MSFP_BODY_ST * C + c] = body[MSFP_BODY_CT] * dq[j][1][c];
-            d[MSFP_BODY_CT * C + c] = -body[MSFP_BODY_ST] * dq[j][1][c];
-        }
 #if !MSFP_PLANAR
-        body[MSFP_BODY_SP] = msfp_sin(q[j][0]);
-        body[MSFP_BODY_CP] = msfp_cos(q[j][0]);
-        for (int c = 0; c < C; ++c) {
-            d[MSFP_BODY_SP * C + c] = body[MSFP_BODY_CP] * dq[j][0][c];
-            d[MSFP_BODY_CP * C + c] = -body[MSFP_BODY_SP] * dq[j][0][c];
-        }
+        x[MSFP_COORDINATES_PSI] = q[j][0];
+        memcpy(d + MSFP_COORDINATES_PSI * C, dq[j][0], sizeof(msfp_columns));
 #endif
-        msfp_gap(p->surface[j], body, sliding[j]);
-        gap_columns(p->surface[j], dp->surface[j], body, d, sliding[j], gaps[j]);
+        x[MSFP_COORDINATES_THETA] = q[j][1];
+        memcpy(d + MSFP_COORDINATES_THETA * C, dq[j][1], sizeof(msfp_columns));
+        msfp_gap(p->surface[j], x, sliding[j]);
+        gap_columns(p->surface[j], dp->surface[j], x, d, sliding[j], gaps[j]);
     }
 }
 
@@ -153,18 +145,19 @@ MSFP_INLINE void surface_columns(const msfp_parameters *p, const msfp_parameter_
 {
     const double *contact = w->contact[j], *dcontact = d->contact[j];
     msfp_columns gap[MSFP_GAP_SIZE], *angles = row + MSFP_ROW_ANGLES + 2 * j, *slip = row + MSFP_ROW_SLIP + 2 * j;
-    double sliding[MSFP_GAP_SIZE];
+    double sliding[MSFP_GAP_SIZE], dangles[MSFP_CONTACT_ANGLES_SIZE * C];
     memcpy(row[MSFP_ROW_NORMAL + j], dcontact + MSFP_CONTACT_N * C, sizeof *row);
     memset(angles[0], 0, sizeof *angles);
     memset(slip[1], 0, sizeof *slip);
+    msfp_contact_angles_direction(contact, dcontact, dangles);
+    memcpy(angles[1], dangles + MSFP_CONTACT_ANGLES_THETA * C, sizeof *angles);
+#if !MSFP_PLANAR
+    memcpy(angles[0], dangles + MSFP_CONTACT_ANGLES_PSI * C, sizeof *angles);
+#endif
     for (int c = 0; c < C; ++c) {
 #if !MSFP_PLANAR
-        angles[0][c] = contact[MSFP_CONTACT_CP] * dcontact[MSFP_CONTACT_SP * C + c] -
-                       contact[MSFP_CONTACT_SP] * dcontact[MSFP_CONTACT_CP * C + c];
         slip[1][c] = dcontact[MSFP_CONTACT_V * C + c];
 #endif
-        angles[1][c] = contact[MSFP_CONTACT_CT] * dcontact[MSFP_CONTACT_ST * C + c] -
-                       contact[MSFP_CONTACT_ST] * dcontact[MSFP_CONTACT_CT * C + c];
         slip[0][c] = dcontact[MSFP_CONTACT_U * C + c];
         row[MSFP_ROW_RIM + j][c] = w->rim_active[j] ? -d->rim[j][MSFP_RIM_FC * C + c] : 0.0;
 #if MSFP_LAW
@@ -174,8 +167,8 @@ MSFP_INLINE void surface_columns(const msfp_parameters *p, const msfp_parameter_
         row[MSFP_ROW_REMEMBERED + j][c] = dcontact[MSFP_CONTACT_MEMORY * C + c];
 #endif
     }
-    msfp_gap(p->surface[j], w->body[j + 1], sliding);
-    gap_columns(p->surface[j], dp->surface[j], w->body[j + 1], d->body[j + 1], sliding, gap);
+    msfp_gap(p->surface[j], w->x[j + 1], sliding);
+    gap_columns(p->surface[j], dp->surface[j], w->x[j + 1], d->x[j + 1], sliding, gap);
     memcpy(row[MSFP_ROW_SLIDING + j], gap[MSFP_GAP_S], sizeof *row);
     memcpy(row[MSFP_ROW_GAP + j], gap[MSFP_GAP_G], sizeof *row);
 #if MSFP_UPLIFT
