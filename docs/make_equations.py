@@ -123,6 +123,7 @@ TITLES = {
     "forward": "Kinematics of a body from the body below: (2.1)-(2.6), (3.4)-(3.12), and rates with (2.36)",
     "contact_angles": "Angles of the normal's position (2.85)",
     "gap": "Sliding and gap (3.20), (3.21)",
+    "gap_at": "The same from angles alone (3.20), (3.21)",
     "rim": "Rim contact (3.20)-(3.25), applied only while it pushes",
     "spring_stage": "The spring below a supported mass: constants of its stage formula",
     "resting_foot": "The foot of a supported mass at rest",

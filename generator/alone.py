@@ -6,7 +6,6 @@ that is given is one row of numbers, z; a Jacobian has a column for each of them
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from math import prod
@@ -20,7 +19,7 @@ from msfp_gen.specification.layout import ModelSpec
 from . import Generated
 from .derive import Equations, derive
 from .directions import BY_VARIABLES, COLUMNS, directed
-from .drivers import LENGTHS, form_of, part
+from .drivers import LENGTHS, Printer, form_of
 from .emit import function
 from .interface import effects_text, environment, surface_values
 from .lower import lower
@@ -152,13 +151,6 @@ def _programs(equations: Equations, called: set[str]) -> list[Program]:
     ]
 
 
-def _plain(text: str) -> str:
-    """C of a driver in terms of the blocks s and their derivatives ds alone."""
-    text = re.sub(r"msfp_rim_force\(p, w, j, .*\);", "rim_force(p, s, j);", text)
-    text = re.sub(r"\bw->d(?=(?:x|body|force|moment)\b)", "ds->", text)
-    return re.sub(r"\bw->", "s->", text)
-
-
 def equations_alone(spec: ModelSpec, example: Any) -> Generated:
     """The files of the equations alone. example: values of a bearing for the README.
 
@@ -182,7 +174,7 @@ def equations_alone(spec: ModelSpec, example: Any) -> Generated:
     derivatives = [lower(program) for program in directed(BY_INPUTS, schedules, by_name, equations.blocks).values()]
     form = form_of(BY_INPUTS, schedules, derivatives)
     blocks = {use.block.name: use.block for program in programs for use in (*program.inputs, program.output) if use}
-    drivers = [part(name, passes, by_name, [form]) for name, passes in schedules.items()]
+    drivers = [Printer(alone=True).part(name, passes, by_name, [form]) for name, passes in schedules.items()]
     names = {kind: i for i, kind in enumerate(inputs_of(spec))}
     sizes = [prod(shape) for shape in inputs_of(spec).values()]
     starts = [sum(sizes[:i]) for i in range(len(sizes))]
@@ -197,7 +189,6 @@ def equations_alone(spec: ModelSpec, example: Any) -> Generated:
         "functions": [function(kernel) for kernel in kernels],
         "derivatives": [function(kernel) for kernel in derivatives],
         "drivers": drivers,
-        "plain": _plain,
         "width": WIDTH,
         "places": list(parts.input_places()),
         "inputs": [(name, shape, starts[names[name]]) for name, shape in inputs_of(spec).items()],

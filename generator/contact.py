@@ -203,14 +203,29 @@ def contact_angles(b: Blocks) -> Program:
 
 
 def gap(b: Blocks) -> Program:
-    """Sliding displacement (3.20) and gap (3.21); the arccos is written as an atan2, which is exact at zero tilt."""
+    """Sliding displacement (3.20) and gap (3.21) where the body above is evaluated."""
     p = Program("gap", "sliding displacement and gap (3.20), (3.21)")
     par: Symbols = p.read(b.surface_parameters, "par")
+    above: Symbols = p.read(b.body, "a")
+    return _gap(p, b, par, (above["sp"], above["cp"]), (above["st"], above["ct"]))
+
+
+def gap_at(b: Blocks) -> Program:
+    """The same from the angles of the body above alone."""
+    p = Program("gap_at", "sliding displacement and gap (3.20), (3.21), from angles")
+    par: Symbols = p.read(b.surface_parameters, "par")
     x: Symbols = p.read(b.coordinates, "x")
-    sin_psi, cos_psi = p.let(sp.sin(x["psi"])), p.let(sp.cos(x["psi"]))
-    sin_theta, cos_theta = p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))
-    sine = p.let(norm(sin_theta, p.let(sin_psi * cos_theta)))
-    s = p.let(par["R"] * ArcTan2(sine, p.let(cos_psi * cos_theta)))
+    psi, theta = (
+        (p.let(sp.sin(x["psi"])), p.let(sp.cos(x["psi"]))),
+        (p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))),
+    )
+    return _gap(p, b, par, psi, theta)
+
+
+def _gap(p: Program, b: Blocks, par: Symbols, psi: tuple[sp.Expr, sp.Expr], theta: tuple[sp.Expr, sp.Expr]) -> Program:
+    """psi, theta: sine and cosine. The arccos is written as an atan2, which is exact at zero tilt."""
+    sine = p.let(norm(theta[0], p.let(psi[0] * theta[1])))
+    s = p.let(par["R"] * ArcTan2(sine, p.let(psi[1] * theta[1])))
     p.write(b.gap, {"s": s, "g": par["sc"] - s})
     return p
 

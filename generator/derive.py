@@ -83,6 +83,7 @@ def derive(spec: ModelSpec) -> Equations:
         top.top_energy(blocks),
         contact.contact_angles(blocks),
         contact.gap(blocks),
+        contact.gap_at(blocks),
         *energy.programs(blocks, effects.rims, effects.uplift, effects.top_rotation),
         *(two_port.programs(blocks) if effects.permits_moving_ends else ()),
     ]

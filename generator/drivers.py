@@ -50,12 +50,12 @@ LOOPS = {
 }
 LENGTHS = {Per.STACK: "", Per.SURFACE: "MSFP_NB", Per.BODY: "MSFP_NB + 1"}
 INDICES = {"base": "0", "top": "MSFP_NB", "slider": "msfp_slider(j)"}
-CONDITIONS = {  # the argument of the driver that it reads, and its C
-    When.RIM_PUSHES: ("w", "w->rim_active[j]"),
-    When.RIM_CLOSED: ("w", "w->rim_gap[j] < 0.0"),
-    When.ON_FACE: ("w", "w->standing[j] == MSFP_ON_FACE"),
-    When.ON_EDGE: ("w", "w->standing[j] == MSFP_ON_EDGE"),
-    When.OFF_CENTRE: ("w", "msfp_body_sp(w->body[j + 1]) != 0.0 || w->body[j + 1][MSFP_BODY_ST] != 0.0"),
+CONDITIONS = {  # C; w: the argument of the driver that is the work area
+    When.RIM_PUSHES: "{w}->rim_active[j]",
+    When.RIM_CLOSED: "{w}->rim_gap[j] < 0.0",
+    When.ON_FACE: "{w}->standing[j] == MSFP_ON_FACE",
+    When.ON_EDGE: "{w}->standing[j] == MSFP_ON_EDGE",
+    When.OFF_CENTRE: "msfp_body_sp({w}->body[j + 1]) != 0.0 || {w}->body[j + 1][MSFP_BODY_ST] != 0.0",
 }
 RUNTIME: Mapping[tuple[str, str], tuple[str, tuple[str, ...]]] = {
     ("foot", "values"): ("msfp_move_foot", ("p", "s->foot_stage", "w")),
@@ -76,6 +76,8 @@ RUNTIME: Mapping[tuple[str, str], tuple[str, tuple[str, ...]]] = {
 }
 """What the runtime does itself: program and form -> its function and what this is given; of `jacobians` where these are
 wanted."""
+ALONE = {("rim", "values"): ("rim_force", ("p", "s", "j"))}
+"""The same of the equations without the runtime."""
 WHERE = {"foot": "if (msfp_top_is_sprung(p)) ", "contact": LOOPS[Over.SURFACES] + " "}
 """What the runtime solves, of which the derivatives by the motion of the ends are a program: where this runs."""
 Programs = Mapping[str, Program]
@@ -193,9 +195,9 @@ def schedule_context(
     forms += [form_of(BY_PARAMETERS, with_directions, kernels) for kernels in (directional,) if kernels]
     forms += [form_of(BY_ENDS, of_ends, kernels) for kernels in (by_ends,) if kernels]
     every = {**balances, **with_directions, **port}
-    moving = _moving_lists(tangents, of_variables)
+    moving, printer = _moving_lists(tangents, of_variables), Printer()
     return {
-        "parts": [part(name, passes, programs, forms) for name, passes in every.items()],
+        "parts": [printer.part(name, passes, programs, forms) for name, passes in every.items()],
         "directed": list(with_directions),
         "of_ends": list(of_ends),
         "of_variables": list(of_variables),
@@ -214,7 +216,10 @@ def schedule_context(
             if LISTS[name].storage is not ListStorage.PARAMETERS
         ],
         "variables": [
-            (kind, [one for name, quantities in parts if (one := _entries(name, quantities, equations))["entries"]])
+            (
+                kind,
+                [one for name, quantities in parts if (one := printer.entries(name, quantities, equations))["entries"]],
+            )
             for kind, parts in VARIABLES.items()
         ],
         "unknowns": unknowns(equations.spec),
@@ -274,31 +279,166 @@ def _read_values(schedule: Schedule, kernels: Mapping[str, Kernel]) -> set[str]:
     return read
 
 
-def part(name: str, passes: Iterable[Pass], programs: Programs, along: Iterable[Form]) -> dict[str, Any]:
-    """A part of a schedule for the templates: its passes, each with its lines, for values and for derivatives."""
-    calls = list(calls_of(passes))
-    forms: dict[str, Lines] = {"values": _values}
-    forms |= {form.along.name: partial(_directions, form=form) for form in along if name in form.parts}
-    lines = {
-        form: [(one, [line for call in one.calls for line in of(call, programs)]) for one in passes]
-        for form, of in forms.items()
-    }
-    added = dict.fromkeys(place for call in calls if call.adds for place in call.writes)
-    return {
-        "name": name,
-        "added": {form: [member(list_of(place), form) for place in added] for form in forms},
-        "constant": not any(list_of(place).storage is ListStorage.WORK for call in calls for place in call.writes),
-        "fails": any(isinstance(call.by, Solve) and call.by.fails for call in calls),
-        "unused": {form: _unused(line for _, many in written for line in many) for form, written in lines.items()},
-        "passes": {
-            form: [
-                {"over": one.over.value, "loop": LOOPS.get(one.over, ""), "lines": [line.text for line in many]}
-                for one, many in written
-                if many
-            ]
-            for form, written in lines.items()
-        },
-    }
+RECORDS = {ListStorage.PARAMETERS: "p", ListStorage.WORK: "w", ListStorage.HERE: "s"}
+"""The argument of a driver that is the record."""
+
+
+@dataclass(frozen=True)
+class Printer:
+    """C of the drivers of a schedule.
+
+    alone: without the runtime, where all blocks are one record and their derivatives another, and nothing is solved.
+    """
+
+    alone: bool = False
+
+    @property
+    def runtime(self) -> Mapping[tuple[str, str], tuple[str, tuple[str, ...]]]:
+        """What the C around the drivers does itself."""
+        return ALONE if self.alone else RUNTIME
+
+    def _record(self, storage: ListStorage) -> str:
+        """The argument of a driver that is a record."""
+        return "s" if self.alone and storage is ListStorage.WORK else RECORDS[storage]
+
+    def part(self, name: str, passes: Iterable[Pass], programs: Programs, along: Iterable[Form]) -> dict[str, Any]:
+        """A part of a schedule for the templates: its passes, each with its lines, for values and for derivatives."""
+        calls = list(calls_of(passes))
+        forms: dict[str, Lines] = {"values": self._values}
+        forms |= {form.along.name: partial(self._directions, form=form) for form in along if name in form.parts}
+        lines = {
+            form: [(one, [line for call in one.calls for line in of(call, programs)]) for one in passes]
+            for form, of in forms.items()
+        }
+        added = dict.fromkeys(place for call in calls if call.adds for place in call.writes)
+        return {
+            "name": name,
+            "added": {form: [self.member(list_of(place), form) for place in added] for form in forms},
+            "constant": not any(list_of(place).storage is ListStorage.WORK for call in calls for place in call.writes),
+            "fails": any(isinstance(call.by, Solve) and call.by.fails for call in calls),
+            "unused": {form: _unused(line for _, many in written for line in many) for form, written in lines.items()},
+            "passes": {
+                form: [
+                    {"over": one.over.value, "loop": LOOPS.get(one.over, ""), "lines": [line.text for line in many]}
+                    for one, many in written
+                    if many
+                ]
+                for form, written in lines.items()
+            },
+        }
+
+    def member(self, one: List, form: str) -> str:
+        """C of the blocks of a list, or of their derivatives; empty for parameters where they are constant."""
+        if form == "values":
+            return f"{self._record(one.storage)}->{one.name}"
+        if one.storage is ListStorage.PARAMETERS:
+            return f"dp->{one.name}" if form == "directions" else ""
+        if form == "tangents":
+            return f"w->d{one.name}" if one.tangents and not self.alone else f"ds->{one.name}"
+        return f"d->{one.name}" if form == "by_ends" or one.directions else f"ds->{one.name}"
+
+    def entries(self, name: str, quantities: Iterable[str], equations: Equations) -> dict[str, Any]:
+        """Indices of the fields of a kind of variable in the block of a list; -1: not stored, as E2 in the plane."""
+        one = LISTS[name]
+        block: Block = getattr(equations.blocks, one.kind)
+        index = {field.name: i for i, field in enumerate(block.fields)}
+        parts = [part for quantity in quantities for part in block.quantities.get(quantity, ())]
+        at = "" if one.per is Per.STACK else "[v->index]"
+        entries = [index[part] if isinstance(part, str) else -1 for part in parts]
+        return {**{form: f"{self.member(one, form)}{at}" for form in ("values", "tangents")}, "entries": entries}
+
+    def _in_c(self, place: str, form: str) -> str:
+        """C of a place, or of its derivatives."""
+        index = index_of(place)
+        index = INDICES.get(index, index.replace("-", " - ").replace("+", " + "))
+        return self.member(list_of(place), form) + (f"[{index}]" if index else "")
+
+    def _all_in_c(self, places: Iterable[str], form: str) -> list[str]:
+        return [self._in_c(place, form) for place in places]
+
+    def _values(self, call: Call, programs: Programs) -> Iterator[Line]:
+        """Statements that evaluate a call."""
+        if call.by is None:
+            yield from self._evaluated(call, programs[call.program])
+        elif isinstance(call.by, Solve) or call.by.values in (Values.RUNTIME, Values.RUNTIME_WITH_SLOPES):
+            function, given = self.runtime[call.program, "values"]
+            if isinstance(call.by, If) and call.by.values is Values.RUNTIME:
+                given = tuple("NULL" if place.startswith("s->jacobians") else place for place in given)
+            solved = _run(function, given)
+            if isinstance(call.by, Solve) and call.by.fails:
+                yield Line(f"const int status = {solved.text};", solved.names)
+                yield Line("if (status)")
+                yield Line("    return status;")
+            else:
+                yield Line(f"{solved.text};", solved.names)
+        elif call.by.values is Values.HERE:
+            many = ((name, list(self._evaluated(call, programs[name]))) for name in call.programs)
+            yield from self._chosen(call, self._all_in_c(call.writes, "values"), many)
+
+    def _evaluated(self, call: Call, program: Program) -> Iterator[Line]:
+        reads, writes = self._all_in_c(call.reads, "values"), self._all_in_c(call.writes, "values")
+        yield from _written(call, f"msfp_{program.name}", reads, writes, _size(program))
+
+    def _moving(self, call: Call, program: Program, form: str) -> list[str]:
+        """C of the derivatives that a program reads."""
+        return [self._in_c(place, form) for place, use in zip(call.reads, program.inputs, strict=False) if use.moving]
+
+    def _directions(self, call: Call, programs: Programs, form: Form) -> Iterator[Line]:
+        """Statements that differentiate a call, with its values where the work area does not hold them."""
+        if not _has(call, form):
+            return
+        if isinstance(call.by, Solve):
+            yield from self._of_solved(call, form)
+            return
+        writes = self._all_in_c(call.writes, form.along.name)
+        names = {list_name(place) for place in call.writes}
+        values = any(LISTS[name].storage is ListStorage.HERE for name in names & form.read)
+        many = ((name, list(self._direction(call, programs[name], writes, values, form))) for name in call.programs)
+        yield from self._chosen(call, writes, many)
+
+    def _of_solved(self, call: Call, form: Form) -> Iterator[Line]:
+        """The same of what the runtime solves: it differentiates this itself, or the derivatives are a program."""
+        name = form.along.name
+        if (call.program, name) in self.runtime:
+            yield _statement(*self.runtime[call.program, name])
+        elif call.program in form.kernels:
+            derivatives = form.kernels[call.program].program
+            # The friction force of the surfaces, for which the runtime solves, is not in a list.
+            reads = ["s->g[j]" if place == "friction_force[j]" else self._in_c(place, "values") for place in call.reads]
+            given = [*reads, *self._all_in_c(call.writes, "values"), *self._moving(call, derivatives, name)]
+            called = _statement(f"msfp_{derivatives.name}", [*given, *self._all_in_c(call.writes, name)])
+            when = _line(WHERE[call.program], "p") if call.program == "foot" else Line(WHERE[call.program])
+            yield Line(when.text + called.text, when.names | called.names)
+
+    def _direction(
+        self, call: Call, program: Program, writes: list[str], with_values: bool, form: Form
+    ) -> Iterator[Line]:
+        if with_values:
+            yield from self._evaluated(call, program)
+        derivatives = form.kernels[program.name].program
+        values = self._all_in_c(call.writes, "values") if output_is_stored(call) and not form.along.again else []
+        given = [*self._all_in_c(call.reads, "values"), *values, *self._moving(call, derivatives, form.along.name)]
+        size = f"{_size(program)} * {derivatives.columns}"
+        yield from _written(call, f"msfp_{derivatives.name}", given, writes, size)
+
+    def _chosen(self, call: Call, writes: list[str], programs: Iterable[tuple[str, list[Line]]]) -> Iterator[Line]:
+        """Statements of the program that acts; where none does, the derivatives are zero."""
+        if not isinstance(call.by, If):
+            for _, statements in programs:
+                yield from statements
+            return
+        start = ""
+        for name, statements in programs:
+            argument = self._record(ListStorage.WORK)
+            condition = CONDITIONS[call.by.acts[name]].format(w=argument)
+            yield _line(f"{start}if ({condition}) {{", argument)
+            yield from (statement.inside("    ") for statement in statements)
+            start = "} else "
+        if call.adds:
+            yield Line("}")
+            return
+        yield Line("} else")
+        yield _line(f"    memset({writes[0]}, 0, sizeof {writes[0]});", writes[0])
 
 
 def _has(call: Call, form: Form) -> bool:
@@ -314,71 +454,9 @@ def _unused(lines: Iterable[Line]) -> list[str]:
     return [name for name in ("p", "dp", "w", "d", "s", "ds") if name not in named]
 
 
-RECORDS = {ListStorage.PARAMETERS: "p", ListStorage.WORK: "w", ListStorage.HERE: "s"}
-"""The argument of a driver that is the record."""
-
-
-def member(one: List, form: str) -> str:
-    """C of the blocks of a list, or of their derivatives; empty for parameters where they are constant."""
-    if form == "values":
-        return f"{RECORDS[one.storage]}->{one.name}"
-    if one.storage is ListStorage.PARAMETERS:
-        return f"dp->{one.name}" if form == "directions" else ""
-    if form == "tangents":
-        return f"w->d{one.name}" if one.tangents else f"ds->{one.name}"
-    return f"d->{one.name}" if form == "by_ends" or one.directions else f"ds->{one.name}"
-
-
 def _declared(one: List, equations: Equations) -> dict[str, str]:
     block: Block = getattr(equations.blocks, one.kind)
     return {"name": one.name, "block": block.name, "length": LENGTHS[one.per]}
-
-
-def _entries(name: str, quantities: Iterable[str], equations: Equations) -> dict[str, Any]:
-    """Indices of the fields of a kind of variable in the block of a list; -1: not stored, as E2 in the plane."""
-    one = LISTS[name]
-    block: Block = getattr(equations.blocks, one.kind)
-    index = {field.name: i for i, field in enumerate(block.fields)}
-    parts = [part for quantity in quantities for part in block.quantities.get(quantity, ())]
-    at = "" if one.per is Per.STACK else "[v->index]"
-    entries = [index[part] if isinstance(part, str) else -1 for part in parts]
-    return {**{form: f"{member(one, form)}{at}" for form in ("values", "tangents")}, "entries": entries}
-
-
-def _in_c(place: str, form: str) -> str:
-    """C of a place, or of its derivatives."""
-    index = index_of(place)
-    index = INDICES.get(index, index.replace("-", " - ").replace("+", " + "))
-    return member(list_of(place), form) + (f"[{index}]" if index else "")
-
-
-def _all_in_c(places: Iterable[str], form: str) -> list[str]:
-    return [_in_c(place, form) for place in places]
-
-
-def _values(call: Call, programs: Programs) -> Iterator[Line]:
-    """Statements that evaluate a call."""
-    if call.by is None:
-        yield from _evaluated(call, programs[call.program])
-    elif isinstance(call.by, Solve) or call.by.values in (Values.RUNTIME, Values.RUNTIME_WITH_SLOPES):
-        function, given = RUNTIME[call.program, "values"]
-        if isinstance(call.by, If) and call.by.values is Values.RUNTIME:
-            given = tuple("NULL" if place.startswith("s->jacobians") else place for place in given)
-        solved = _run(function, given)
-        if isinstance(call.by, Solve) and call.by.fails:
-            yield Line(f"const int status = {solved.text};", solved.names)
-            yield Line("if (status)")
-            yield Line("    return status;")
-        else:
-            yield Line(f"{solved.text};", solved.names)
-    elif call.by.values is Values.HERE:
-        many = ((name, list(_evaluated(call, programs[name]))) for name in call.programs)
-        yield from _chosen(call, _all_in_c(call.writes, "values"), many)
-
-
-def _evaluated(call: Call, program: Program) -> Iterator[Line]:
-    reads, writes = _all_in_c(call.reads, "values"), _all_in_c(call.writes, "values")
-    yield from _written(call, f"msfp_{program.name}", reads, writes, _size(program))
 
 
 def _written(call: Call, function: str, arguments: list[str], writes: list[str], size: str) -> Iterator[Line]:
@@ -400,69 +478,6 @@ def _written(call: Call, function: str, arguments: list[str], writes: list[str],
 def _statement(function: str, given: Iterable[str]) -> Line:
     called = _run(function, given)
     return replace(called, text=f"{called.text};")
-
-
-def _moving(call: Call, program: Program, form: str) -> list[str]:
-    """C of the derivatives that a program reads."""
-    return [_in_c(place, form) for place, use in zip(call.reads, program.inputs, strict=False) if use.moving]
-
-
-def _directions(call: Call, programs: Programs, form: Form) -> Iterator[Line]:
-    """Statements that differentiate a call along directions, with its values where the work area does not hold them."""
-    if not _has(call, form):
-        return
-    if isinstance(call.by, Solve):
-        yield from _of_solved(call, form)
-        return
-    writes = _all_in_c(call.writes, form.along.name)
-    names = {list_name(place) for place in call.writes}
-    values = any(LISTS[name].storage is ListStorage.HERE for name in names & form.read)
-    many = ((name, list(_direction(call, programs[name], writes, values, form))) for name in call.programs)
-    yield from _chosen(call, writes, many)
-
-
-def _of_solved(call: Call, form: Form) -> Iterator[Line]:
-    """The same of what the runtime solves: it differentiates this itself, or the derivatives are a program."""
-    name = form.along.name
-    if (call.program, name) in RUNTIME:
-        yield _statement(*RUNTIME[call.program, name])
-    elif call.program in form.kernels:
-        derivatives = form.kernels[call.program].program
-        # The friction force of the surfaces, for which the runtime solves, is not in a list.
-        reads = ["s->g[j]" if place == "friction_force[j]" else _in_c(place, "values") for place in call.reads]
-        given = [*reads, *_all_in_c(call.writes, "values"), *_moving(call, derivatives, name)]
-        called = _statement(f"msfp_{derivatives.name}", [*given, *_all_in_c(call.writes, name)])
-        when = _line(WHERE[call.program], "p") if call.program == "foot" else Line(WHERE[call.program])
-        yield Line(when.text + called.text, when.names | called.names)
-
-
-def _direction(call: Call, program: Program, writes: list[str], with_values: bool, form: Form) -> Iterator[Line]:
-    if with_values:
-        yield from _evaluated(call, program)
-    derivatives = form.kernels[program.name].program
-    values = _all_in_c(call.writes, "values") if output_is_stored(call) and not form.along.again else []
-    given = [*_all_in_c(call.reads, "values"), *values, *_moving(call, derivatives, form.along.name)]
-    size = f"{_size(program)} * {derivatives.columns}"
-    yield from _written(call, f"msfp_{derivatives.name}", given, writes, size)
-
-
-def _chosen(call: Call, writes: list[str], programs: Iterable[tuple[str, list[Line]]]) -> Iterator[Line]:
-    """Statements of the program that acts; where none does, the derivatives are zero."""
-    if not isinstance(call.by, If):
-        for _, statements in programs:
-            yield from statements
-        return
-    start = ""
-    for name, statements in programs:
-        argument, condition = CONDITIONS[call.by.acts[name]]
-        yield _line(f"{start}if ({condition}) {{", argument)
-        yield from (statement.inside("    ") for statement in statements)
-        start = "} else "
-    if call.adds:
-        yield Line("}")
-        return
-    yield Line("} else")
-    yield _line(f"    memset({writes[0]}, 0, sizeof {writes[0]});", writes[0])
 
 
 def _size(program: Program) -> str:

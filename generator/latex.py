@@ -167,7 +167,8 @@ PLACES: dict[str, dict[str, str]] = {
     "body_block": {"b": "k", "s": "k", "out": "k"},
     "forward": {"par": "k", "u": "k-1", "x": "k", "out": "k"},
     "contact_angles": {"c": r"\gamma", "out": r"\gamma"},
-    "gap": {"par": r"\gamma", "x": r"\gamma+1", "out": r"\gamma"},
+    "gap": {"par": r"\gamma", "a": r"\gamma+1", "out": r"\gamma"},
+    "gap_at": {"par": r"\gamma", "x": r"\gamma+1", "out": r"\gamma"},
     "rim": {"par": r"\gamma", "x": r"\gamma+1", "out": r"\gamma"},
     "interface_force": {"par": "k", "b": "k", "up": "k", "out": "k-1"},
     "surface_local": {

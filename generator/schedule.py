@@ -495,7 +495,7 @@ def two_port(effects: Effects) -> Schedule:
     """The ends of a two-port: load and support of the top plate; after an evaluation the wrenches of the ends."""
     moment = "below[base]" if effects.uplift else "moment[base]"
     support = (Call("upright", ("support",), ("upright",)),) if effects.top_rotation else ()
-    sliding = Call("gap", ("surface_parameters[j]", "x[j+1]"), ("gap[j]",), If({"gap": When.OFF_CENTRE}))
+    sliding = Call("gap", ("surface_parameters[j]", "body[j+1]"), ("gap[j]",), If({"gap": When.OFF_CENTRE}))
     return {
         "interface": (
             Pass(Over.TOP, (Call("interface_load", ("top_parameters", "far_end"), ("load_force",)), *support)),
@@ -541,7 +541,8 @@ def beside(effects: Effects) -> Schedule:
             Pass(
                 Over.SURFACES,
                 (
-                    Call("gap", ("surface_parameters[j]", "x[j+1]"), ("gap[j]",), replace(by, gives_results=True)),
+                    Call("gap", ("surface_parameters[j]", "body[j+1]"), ("gap[j]",), replace(by, gives_results=True)),
+                    Call("gap_at", ("surface_parameters[j]", "x[j+1]"), ("gap[j]",), replace(by, gives_results=True)),
                     Call("contact_angles", ("contact[j]",), ("contact_angles[j]",), by),
                 ),
             ),

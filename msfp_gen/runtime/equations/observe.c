@@ -114,7 +114,7 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
         msfp_contact_angles(contact, angles);
         row->angles[j][0] = msfp_contact_angles_psi(angles);
         row->angles[j][1] = angles[MSFP_CONTACT_ANGLES_THETA];
-        msfp_gap(p->surface[j], w->x[j + 1], sliding);
+        msfp_gap(p->surface[j], w->body[j + 1], sliding);
         row->sliding[j] = sliding[MSFP_GAP_S];
         row->gap[j] = MSFP_UPLIFT && MSFP_RIMS ? w->rim_gap[j] : sliding[MSFP_GAP_G];
         row->rim[j] = w->rim_active[j] ? -w->rim[j][MSFP_RIM_FC] : 0.0;

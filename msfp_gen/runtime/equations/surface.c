@@ -53,6 +53,6 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
         x[MSFP_COORDINATES_PSI] = q[j][0];
 #endif
         x[MSFP_COORDINATES_THETA] = q[j][1];
-        msfp_gap(p->surface[j], x, sliding[j]);
+        msfp_gap_at(p->surface[j], x, sliding[j]);
     }
 }

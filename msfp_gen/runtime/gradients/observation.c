@@ -10,13 +10,9 @@
 #if MSFP_GRADIENTS
 #include "msfp_directions.h"
 
-/* Columns of sliding displacement and gap from the coordinates of the body above. The sliding displacement has a kink at
- * the centre, where its columns are zero. */
-MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double *x, const double *dx,
-                             const double *sliding, msfp_columns *gap)
+/* The sliding displacement has a kink at the centre, where its columns are zero. */
+MSFP_INLINE void set_gap_columns(const double *dpar, const double *d, const double *sliding, msfp_columns *gap)
 {
-    double d[MSFP_GAP_SIZE * C];
-    msfp_gap_direction(par, x, sliding, dpar, dx, d);
     const int centred = sliding[MSFP_GAP_S] == 0.0;
     for (int c = 0; c < C; ++c) {
         gap[MSFP_GAP_S][c] = centred ? 0.0 : d[MSFP_GAP_S * C + c];
@@ -29,16 +25,17 @@ MSFP_WIDE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_
                                  double sliding[MSFP_NB][MSFP_GAP_SIZE],
                                  msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE])
 {
-    double x[MSFP_COORDINATES_SIZE] = { 0 }, d[MSFP_COORDINATES_SIZE * C] = { 0 };
+    double x[MSFP_COORDINATES_SIZE] = { 0 }, dx[MSFP_COORDINATES_SIZE * C] = { 0 }, d[MSFP_GAP_SIZE * C];
     for (int j = 0; j < NB; ++j) {
 #if !MSFP_PLANAR
         x[MSFP_COORDINATES_PSI] = q[j][0];
-        memcpy(d + MSFP_COORDINATES_PSI * C, dq[j][0], sizeof(msfp_columns));
+        memcpy(dx + MSFP_COORDINATES_PSI * C, dq[j][0], sizeof(msfp_columns));
 #endif
         x[MSFP_COORDINATES_THETA] = q[j][1];
-        memcpy(d + MSFP_COORDINATES_THETA * C, dq[j][1], sizeof(msfp_columns));
-        msfp_gap(p->surface[j], x, sliding[j]);
-        gap_columns(p->surface[j], dp->surface[j], x, d, sliding[j], gaps[j]);
+        memcpy(dx + MSFP_COORDINATES_THETA * C, dq[j][1], sizeof(msfp_columns));
+        msfp_gap_at(p->surface[j], x, sliding[j]);
+        msfp_gap_at_direction(p->surface[j], x, sliding[j], dp->surface[j], dx, d);
+        set_gap_columns(dp->surface[j], d, sliding[j], gaps[j]);
     }
 }
 
@@ -145,7 +142,7 @@ MSFP_INLINE void surface_columns(const msfp_parameters *p, const msfp_parameter_
 {
     const double *contact = w->contact[j], *dcontact = d->contact[j];
     msfp_columns gap[MSFP_GAP_SIZE], *angles = row + MSFP_ROW_ANGLES + 2 * j, *slip = row + MSFP_ROW_SLIP + 2 * j;
-    double sliding[MSFP_GAP_SIZE], dangles[MSFP_CONTACT_ANGLES_SIZE * C];
+    double sliding[MSFP_GAP_SIZE], dangles[MSFP_CONTACT_ANGLES_SIZE * C], dgap[MSFP_GAP_SIZE * C];
     memcpy(row[MSFP_ROW_NORMAL + j], dcontact + MSFP_CONTACT_N * C, sizeof *row);
     memset(angles[0], 0, sizeof *angles);
     memset(slip[1], 0, sizeof *slip);
@@ -167,8 +164,9 @@ MSFP_INLINE void surface_columns(const msfp_parameters *p, const msfp_parameter_
         row[MSFP_ROW_REMEMBERED + j][c] = dcontact[MSFP_CONTACT_MEMORY * C + c];
 #endif
     }
-    msfp_gap(p->surface[j], w->x[j + 1], sliding);
-    gap_columns(p->surface[j], dp->surface[j], w->x[j + 1], d->x[j + 1], sliding, gap);
+    msfp_gap(p->surface[j], w->body[j + 1], sliding);
+    msfp_gap_direction(p->surface[j], w->body[j + 1], sliding, dp->surface[j], d->body[j + 1], dgap);
+    set_gap_columns(dp->surface[j], dgap, sliding, gap);
     memcpy(row[MSFP_ROW_SLIDING + j], gap[MSFP_GAP_S], sizeof *row);
     memcpy(row[MSFP_ROW_GAP + j], gap[MSFP_GAP_G], sizeof *row);
 #if MSFP_UPLIFT
