@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
+import sys
 import time
 from typing import Any
 
@@ -11,17 +13,28 @@ import pytest
 from support import ROOT
 
 from msfp_gen import InputError, Scene, Solver, simulate
+from msfp_gen.cli import main
 
 PAGE = ROOT / "docs" / "own_integrator.md"
 
 
 @pytest.fixture(scope="module")
-def page() -> dict[str, Any]:
-    """The names that the page defines, after it ran."""
+def page(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The names that the page defines, after it ran in an empty folder."""
     space: dict[str, Any] = {}
-    for block in re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
-        exec(block, space)
+    with contextlib.chdir(tmp_path_factory.mktemp("page")), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "path", [*sys.path])
+        run(space)
     return space
+
+
+def run(space: dict[str, Any]) -> None:
+    """Run the command and the blocks of the page."""
+    text = PAGE.read_text(encoding="utf-8")
+    command = re.search(r"^msfp-gen (generate .*)$", text, re.MULTILINE)
+    assert command is not None and main(command[1].split()) == 0
+    for block in re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
+        exec(block, space)
 
 
 @pytest.mark.slow
@@ -40,17 +53,19 @@ def test_methods_tend_to_what_simulate_gives(page):
     fine = page["fine"][:, :, 1]
     assert fine.shape == want.shape and np.abs(fine - want).max() < 1e-3 * size
     for name in ("midpoint", "bdf2"):
-        run = page[name]
-        errors = [
-            np.abs(run(page["stack"], page["base"], page["load"], 0.5, 1e-2 / n)[::n, :, 1] - want[::5]).max()
-            for n in (1, 4)
-        ]
-        assert errors[1] < 2e-3 * size, name
-        assert errors[0] / errors[1] > 8, name  # 16 by order 2
+        for stage in ("stage", "stage_of_stack"):
+            errors = [np.abs(page[name](0.5, 1e-2 / n, page[stage])[::n, :, 1] - want[::5]).max() for n in (1, 4)]
+            assert errors[1] < 2e-3 * size, name
+            assert errors[0] / errors[1] > 8, name  # 16 by order 2
     found = page["solve_ivp"](
         page["fun"], (0, 0.5), page["y0"], method="Radau", jac=page["jac"], rtol=1e-6, atol=1e-8
     ).y[:6, -1]
     assert np.abs(found.reshape(2, 3)[:, 1] - want[-1]).max() < 1e-4 * size
+
+
+def test_friction_as_an_unknown_gives_what_the_runtime_solves(page):
+    alone, solved = (page["midpoint"](0.1, 2e-3, page[name]) for name in ("stage", "stage_of_stack"))
+    assert np.abs(alone - solved).max() < 1e-8 * np.abs(solved).max() and np.abs(solved).max() > 1e-5
 
 
 def test_many_states_are_the_states_one_by_one(page):
