@@ -1,4 +1,4 @@
-"""Draw the figure of docs/bounding.md: `python benchmarks/bounds.py`."""
+"""Draw the figure of docs/properties.md: `python benchmarks/bounds.py`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What cheap models save in a study, and whether intervals hold: `python benchmarks/fidelity.py` (docs/fidelity.md).
+"""What cheap models save in a study, and whether intervals hold: `python benchmarks/fidelity.py` (docs/studies.md).
 
 A triple pendulum under a mass, with uncertain friction, azimuth and intensity, under the two bundled records. Every draw
 is run once by each model (`table`); estimates are then repeated with draws from this table, so that the truth is its mean

@@ -2,7 +2,7 @@
 
 Synthetic tests of a triple and a double pendulum at three amplitudes. Those of the first table are random, by runs at
 a tight tolerance; the others are of the triple pendulum of PEER 2017/07, with noise of 1 % of the peak.
-Usage: python benchmarks/fit.py [NUMBER OF FITS]; half an hour for 100, a minute for 1; prints tables of docs/fit.md.
+Usage: python benchmarks/fit.py [NUMBER OF FITS]; half an hour for 100, a minute for 1; prints tables of docs/properties.md.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def bias(scene: Scene) -> None:
 
 
 class Differences(Residuals):
-    """The same residuals, with a Jacobian by finite differences of relative step 0.01 (docs/calibration.md)."""
+    """The same residuals, with a Jacobian by finite differences of relative step 0.01 (docs/properties.md)."""
 
     central, runs = False, 0
 

@@ -2,7 +2,7 @@
 
 The data are the six printed numbers of the column "Experimental": displacements at which the sliding regimes of a
 monotonic push change, and forces at the first contacts of rims 1 and 4. Nothing else is changed from Appendix A.
-Usage: python benchmarks/fit_table.py; a minute; prints the tables of docs/fit.md.
+Usage: python benchmarks/fit_table.py; a minute; prints the tables of docs/properties.md.
 """
 
 from __future__ import annotations

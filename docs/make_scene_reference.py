@@ -63,7 +63,7 @@ MEANINGS = {
     "initial_state": "State at the start, `[initial_state]`, from which the displacement across the bearing counts;"
     " without it centred and at rest.",
     "stop": "Conditions that end the run early: `[stop]`.",
-    "fidelity": "A cheaper model of this scene ([fidelity.md](fidelity.md)).",
+    "fidelity": "A cheaper model of this scene ([studies.md](studies.md#cheaper-models)).",
     "limits": "Limits of the device, with which the verdict of a run compares: `[limits]`"
     " ([results.md](results.md#the-verdict-of-a-run)).",
     "scene.duration": "Length of the run; without it that of the motion.",

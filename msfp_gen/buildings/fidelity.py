@@ -1,4 +1,4 @@
-"""Cheaper models of the scene of a building (docs/fidelity.md)."""
+"""Cheaper models of the scene of a building (docs/studies.md)."""
 
 from __future__ import annotations
 

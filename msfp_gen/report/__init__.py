@@ -1,4 +1,4 @@
-"""HTML pages without network: of a run or a suite (docs/figures.md), of a fit (docs/fit.md), the explorer."""
+"""HTML pages without network: of a run or a suite (docs/figures.md), of a fit (docs/properties.md), the explorer."""
 
 from msfp_gen.report.analysis import analysis_html, write_analysis
 from msfp_gen.report.frames import FRAMES, REPORT_SUFFIXES

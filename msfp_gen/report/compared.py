@@ -30,7 +30,7 @@ COMPARISONS = (
     Comparison("uplift of bearings below a building", "statics, energy, smaller tolerances", "uplift",
                ("physics/test_building_uplift.py",), "building"),
     Comparison("bounds of friction", "the rules of the codes by hand, as the literature quotes them; friction circles",
-               "bounding", ("unit/studies/test_bounding.py",)),
+               "properties", ("unit/studies/test_bounding.py",)),
     Comparison("spectra of records", "closed forms and an independent integration", "motion",
                ("unit/motions/records/test_spectrum.py",)),
     Comparison("capacities, backbone and effective properties of a data sheet", "published devices; formulas by hand",

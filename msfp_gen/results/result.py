@@ -334,7 +334,7 @@ class Result(AnyResult):
 
     @property
     def one_pendulum(self) -> bool:
-        """Whether its surfaces are those of one pendulum in place of the stack (docs/fidelity.md)."""
+        """Whether its surfaces are those of one pendulum in place of the stack (docs/studies.md)."""
         return self.scene.fidelity == "equivalent"
 
     @property

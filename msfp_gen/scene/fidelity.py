@@ -1,4 +1,4 @@
-"""Cheaper models of a scene, made from the scene itself: `at_fidelity`, and the published backbone (docs/fidelity.md).
+"""Cheaper models of a scene, made from the scene itself: `at_fidelity`, and the published backbone (docs/studies.md).
 
 Each is a scene like any other, which the generator derives and compiles; nobody writes one for a layout.
 

@@ -1,4 +1,4 @@
-"""Batches of scenes: scenes come in, results go out as the runs end (docs/batch.md)."""
+"""Batches of scenes: scenes come in, results go out as the runs end (docs/studies.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pools of workers: calls come in, their values go out as they end (docs/batch.md).
+"""Pools of workers: calls come in, their values go out as they end (docs/studies.md).
 
 A pool is an executor in the sense of `concurrent.futures`: the workers of this machine, an executor of the caller, or
 Dask. A worker of this machine is a thread; calls go on to processes of loky where measurement shows that this is

@@ -15,8 +15,8 @@ from msfp_gen.scene.file.loader import scene_from_table
 
 
 def test_the_program_finds_the_coefficients(capsys: pytest.CaptureFixture[str]) -> None:
-    text = (ROOT / "docs" / "calibration.md").read_text(encoding="utf-8")
-    (program,) = re.findall(r"^```python\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+    text = (ROOT / "docs" / "properties.md").read_text(encoding="utf-8")
+    (program,) = re.findall(r"^```python\n(# calibrate.py\n.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
     names: dict[str, Array] = {}
     exec(program, names)
     lines = capsys.readouterr().out.splitlines()

@@ -1,4 +1,4 @@
-"""Bounding analysis: lambda factors -> scenes at lower bound, nominal and upper bound -> runs (docs/bounding.md)."""
+"""Bounding analysis: lambda factors -> scenes at lower bound, nominal and upper bound -> runs (docs/properties.md)."""
 
 from msfp_gen.studies.bounding.factors import SHEET, Factor, FactorTable, factor_tables, factor_text, load_factors
 from msfp_gen.studies.bounding.runs import CASES, Bounds, Case, bound, bounded_scene, bounded_scenes, factors_of

@@ -1,4 +1,4 @@
-"""Calibration: values of a scene for which its runs give the measured forces of laboratory tests (docs/fit.md).
+"""Calibration: values of a scene for which its runs give the measured forces of laboratory tests (docs/properties.md).
 
 Measurements -> residuals of runs -> least squares (`fitting`) -> intervals -> `Fit`.
 """

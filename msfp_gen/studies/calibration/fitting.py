@@ -197,7 +197,7 @@ def _error_notes(residuals: Residuals, solution: Solution) -> list[str]:
 
 TOLERANCE = 1e-5  # relative change of cost and values that ends the search; errors of runs hide smaller changes
 WITHIN = 0.1  # length of a step in standard errors below which the search ends (Bates and Watts 1981)
-FIRST, NEXT = 100.0, 10.0  # divisors of the tolerance, first and later; see docs/fit.md
+FIRST, NEXT = 100.0, 10.0  # divisors of the tolerance, first and later; see docs/properties.md
 LEAST = 1e-7  # least tolerance after the first division
 REST = 0.5  # error left after a division, over the change by the division: at most, in random fits
 SMALL = 0.1  # error of the runs that is small, over half the width of the interval

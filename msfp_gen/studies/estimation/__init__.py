@@ -1,1 +1,1 @@
-"""Estimates of a statistic of a study from cheap and exact runs (docs/fidelity.md)."""
+"""Estimates of a statistic of a study from cheap and exact runs (docs/studies.md)."""

@@ -243,7 +243,7 @@ def test_values_of_the_stack_are_none_of_its_equivalent():
 @pytest.mark.slow
 @pytest.mark.parametrize(("word", "scale"), [("rigid", 0.5), ("massless", 0.5), ("equivalent", 1.5)])
 def test_levels_of_a_building(word, scale):
-    """The equivalent pendulum where the stack slides far beyond its yield displacement (docs/fidelity.md)."""
+    """The equivalent pendulum where the stack slides far beyond its yield displacement (docs/studies.md)."""
     changes = {"motion.duration": 6.0, "motion.scale": scale}
     exact = simulate(changed_scene("hospital-clc", changes))
     run = simulate(changed_scene("hospital-clc", {**changes, "fidelity": word}))
