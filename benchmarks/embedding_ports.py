@@ -116,7 +116,7 @@ def doors() -> dict[str, list[float]]:
         return found | ({"FMU under FMPy": in_fmu(Path(name))} if installed("fmpy", "a unit under FMPy") else {})
 
 
-# ---- the worked example of docs/embedding.md and docs/opensees.md --------------------------------------------------
+# ---- the worked example of docs/embedding.md and docs/other-programs.md --------------------------------------------
 
 
 def block(page: str, index: int) -> str:
@@ -144,7 +144,7 @@ def by_opensees() -> dict[str, float]:
     with Server([("bearing", lambda: port)], 0, report=lambda _: None) as server:
         thread = Thread(target=server.serve, args=(1,))
         thread.start()
-        code = block("opensees.md", 0).replace("7000", str(server.ports[0]))
+        code = block("other-programs.md", 0).replace("7000", str(server.ports[0]))
         code = code.replace("peak = 0.0", "import time\nbegin = time.process_time()\npeak = 0.0")
         begin = process_time()
         command = [sys.executable, "-c", code + "print(time.process_time() - begin)"]

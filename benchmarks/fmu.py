@@ -1,4 +1,4 @@
-"""Costs of a unit (FMU) under FMPy: `python benchmarks/fmu.py`, with FMPy. Rows of docs/fmu.md.
+"""Costs of a unit (FMU) under FMPy: `python benchmarks/fmu.py`, with FMPy. Rows of docs/other-programs.md.
 
 CPU time of a communication step of a triple pendulum under 60 mm of motion, over that of a trial of `TwoPort`; and a
 supported mass by Co-Simulation and by CVODE: its time and its error against a tight tolerance.

@@ -43,7 +43,7 @@ html_theme_options: dict[str, Any] = {
     "show_nav_level": 1,
     "show_prev_next": False,
     # Pages of one wide table, and the gallery, use the whole width.
-    "secondary_sidebar_items": {"docs/validation": [], "docs/comparison": [], "gallery/**": []},
+    "secondary_sidebar_items": {"docs/validation": [], "docs/other-programs": [], "gallery/**": []},
     "header_links_before_dropdown": 8,
     "footer_start": ["copyright"],
     "footer_end": [],

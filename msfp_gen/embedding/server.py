@@ -1,4 +1,4 @@
-"""A server of bearings for `element genericClient` of OpenSees (docs/opensees.md): the protocol, a bearing that
+"""A server of bearings for `element genericClient` of OpenSees (docs/other-programs.md): the protocol, a bearing that
 answers it, and the connections, each of which is a bearing of its own.
 """
 

@@ -1,4 +1,4 @@
-"""What docs/bearing.md, docs/effects.md and docs/comparison.md state is what runs and tables give."""
+"""What docs/bearing.md, docs/effects.md and docs/other-programs.md state is what runs and tables give."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from msfp_gen import load_scene, presets, simulate
 from msfp_gen.specification import contract
 
 BEARING, COMPARISON, EFFECTS = (
-    (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("bearing.md", "comparison.md", "effects.md")
+    (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("bearing.md", "other-programs.md", "effects.md")
 )
 
 

@@ -119,9 +119,7 @@ def test_the_page_shows_a_table_that_loads_and_numbers_that_come_out(tmp_path: P
         assert pair(load_factors(name)) == pytest.approx([float(number) for number in numbers.groups()], abs=5e-4)
 
 
-@pytest.mark.parametrize(
-    "text", [PAGE, (ROOT / "docs" / "results.md").read_text(encoding="utf-8")], ids=["bounds", "results"]
-)
+@pytest.mark.parametrize("text", [PAGE, RESULTS], ids=["bounds", "results"])
 def test_python_on_the_pages_runs(text: str, capsys: Any) -> None:
     blocks = re.findall(r"^```python\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
     names: dict[str, Any] = {}
