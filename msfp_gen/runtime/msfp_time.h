@@ -1,4 +1,4 @@
-/* msfp_time.h: time in the runs of a bearing and of a building: pieces of histories, where steps end, how long they are.
+/* msfp_time.h: time in the runs of a bearing and of a building: pieces of histories, stages, ends and lengths of steps.
  * It stands after msfp_math.h. */
 #ifndef MSFP_TIME_H
 #define MSFP_TIME_H
@@ -16,6 +16,16 @@ MSFP_INLINE void msfp_add(double *restrict sum, const double *restrict rates, do
 {
     for (int i = 0; i < count; ++i)
         sum[i] += weight * rates[i];
+}
+
+/* The stage formula: q = q0 + beta v, a = rate (v - v0) with rate = 1/beta, or 0 without inertia. Of `count` numbers. */
+MSFP_INLINE void msfp_stage_formula(const double *restrict q0, const double *restrict v0, double beta, double rate,
+                                    const double *restrict v, int count, double *restrict q, double *restrict a)
+{
+    for (int i = 0; i < count; ++i) {
+        q[i] = q0[i] + beta * v[i];
+        a[i] = rate * (v[i] - v0[i]);
+    }
 }
 
 /* The piece that holds t, searched from the piece `last`. */

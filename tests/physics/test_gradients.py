@@ -152,7 +152,8 @@ def test_the_load_before_a_jump_counts_in_the_step_that_ends_there() -> None:
     beside = scene.motion.coefficients.copy()
     beside[:, :2, 0] += 0.02, -0.01
     motion = replace(scene.motion, coefficients=beside)
-    check_frozen(replace(scene, motion=motion, motion_table=None, load=load), ["load.scale", "motion.scale"], 1e-3)
+    # By smaller differences, what Newton's method leaves is 1e-6 of the moments and more.
+    check_frozen(replace(scene, motion=motion, motion_table=None, load=load), ["load.scale", "motion.scale"], 2e-3)
 
 
 @pytest.mark.slow
@@ -291,8 +292,9 @@ def test_works_through_a_rim_contact_with_the_same_steps(
     scene = replace(scene, bearing=scene.bearing.replace(rim_damping=damping, **DAMPED))
     paths, steps = ["rim_stiffness", "rim_damping", "radius"], np.linspace(0.0, 0.3, count + 1)[1:]
     check_frozen(scene, ["bearing.surfaces[0].capacity"], sizes[0], steps=steps)
+    # Steps this small show what Newton's method leaves, at most 1e-10.
     values = check_frozen(
-        scene, [*(f"bearing.surfaces[0].{name}" for name in paths), "motion.scale"], sizes[1], 1.0, steps
+        scene, [*(f"bearing.surfaces[0].{name}" for name in paths), "motion.scale"], sizes[1], 1.0, steps, 3e-11
     )
     gap, force = values["gap"][:, 0], values["rim_force"][:, 0]
     assert np.any((gap < 0) & (force == 0))

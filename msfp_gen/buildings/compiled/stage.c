@@ -148,10 +148,7 @@ static double evaluate(msfp_building *b, double beta)
     const msfp_building_scene *s = &b->scene;
     const int r = s->attachments;
     double size = 0.0;
-    for (int i = 0; i < r; ++i) {
-        b->scratch[i] = b->Q[i] + beta * b->x[i];
-        b->scratch[r + i] = (b->x[i] - b->V[i]) / beta;
-    }
+    msfp_stage_formula(b->Q, b->V, beta, 1.0 / beta, b->x, r, b->scratch, b->scratch + r);
     for_each_bearing(b, solve_bearing);
     if (first_failure(b))
         return INFINITY;
@@ -320,7 +317,7 @@ static void end_stage(msfp_building *b, int i, double beta)
         v[c] = b->x[c] - v[c];
     follow(b, v);
     for (size_t c = 0; c < n; ++c)
-        a[c] = (v[c] - b->V[c]) / beta;
+        a[c] = 1.0 / beta * (v[c] - b->V[c]);
     power[DAMPED] = 0.0;
     if (b->damped) {
         multiply(s->attachments, s->damping, v, b->product);

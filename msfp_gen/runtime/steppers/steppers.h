@@ -71,15 +71,6 @@ MSFP_INLINE void msfp_sum_rates(double *sum, const double *states, size_t size, 
         msfp_add(MSFP_FROM(sum, v, width), MSFP_FROM(states, a, width), h * weights[j], MSFP_INTEGRATED * width);
     }
 }
-/* The stage formula: q = q0 + beta v, a = rate (v - v0) with rate = 1/beta, or 0 without inertia. Of `count` numbers. */
-MSFP_INLINE void msfp_stage_formula(const double *restrict q0, const double *restrict v0, double beta, double rate,
-                                    const double *restrict v, int count, double *restrict q, double *restrict a)
-{
-    for (int i = 0; i < count; ++i) {
-        q[i] = q0[i] + beta * v[i];
-        a[i] = rate * (v[i] - v0[i]);
-    }
-}
 /* The cubics through `count` values y and rates d at the ends of a step of length h, at its share s. */
 MSFP_INLINE void msfp_hermite(const double *y0, const double *d0, const double *y1, const double *d1, double h,
                               double s, int count, double *out)
