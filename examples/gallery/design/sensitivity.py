@@ -21,7 +21,7 @@ AXES = {
 }
 bounds = [[axis["low"], axis["high"]] for axis in AXES.values()]
 problem = {"num_vars": len(AXES), "names": list(AXES), "bounds": bounds}
-values = sampling.sample(problem, 32, calc_second_order=False, seed=1)
+values = sampling.sample(problem, 64, calc_second_order=False, seed=1)
 
 # %%
 # All rows of values are one study: it runs on all cores, and goes on where it was interrupted.
