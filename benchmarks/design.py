@@ -1,11 +1,11 @@
-"""The optimum of examples/design.ipynb against a scan of all designs, from other starts, and by finite differences.
+"""The optimum of the example design_by_gradient against a scan, from other starts, and by finite differences.
 
 Usage: python benchmarks/design.py [scan] [search]; five minutes; prints the table of docs/design.md, draws its figure.
 """
 
 from __future__ import annotations
 
-import json
+import runpy
 import time
 from pathlib import Path
 from typing import Any
@@ -20,21 +20,17 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.figures.style import COLOURS, INK, page
 
 ROOT = Path(__file__).resolve().parents[1]
-NOTEBOOK = ROOT / "examples" / "design.ipynb"
+EXAMPLE = ROOT / "examples" / "gallery" / "design" / "design_by_gradient.py"
 STARTS = pick(((0.08, 0.946), (0.06, 0.7), (0.11, 0.9), (0.095, 1.5)), ((0.08, 0.946),))
 WHOLE = np.arange(0.055, 0.1151, pick(0.005, 0.05)), np.arange(0.7, 1.801, pick(0.1, 0.5))  # friction, radius [m]
 STEPS, AROUND = (0.0005, 0.01), pick(3, 1)  # of the scan about the optimum, and their number to each side
 BATCH = 100  # runs at the same time; rows of more would fill the memory
 
 
-def notebook() -> dict[str, Any]:
-    """Names of the notebook after all of its cells have run."""
+def example() -> dict[str, Any]:
+    """Names of the example after it has run."""
     matplotlib.use("agg")
-    names: dict[str, Any] = {}
-    for cell in json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]:
-        if cell["cell_type"] == "code":
-            exec("".join(cell["source"]), names)
-    return names
+    return runpy.run_path(str(EXAMPLE))
 
 
 def scanned(names: dict[str, Any], friction: Array, radius: Array) -> Array:
@@ -142,7 +138,7 @@ if __name__ == "__main__":
     options = parser(__doc__)
     options.add_argument("parts", nargs="*", metavar="PART", help="scan, search; default: both")
     given = options.parse_args()
-    loaded = notebook()  # with the search from the first start
+    loaded = example()  # with the search from the first start
     print("| search | friction | radius [m] | shear | cost | CPU time |\n|---|---|---|---|---|---|")
     for part in given.parts or ("scan", "search"):
         {"scan": scan, "search": search}[part](loaded)

@@ -12,8 +12,8 @@ from sphinx_gallery.scrapers import figure_rst
 from msfp_gen.figures.style import COLOURS, PALE
 
 ORDER = (
-    "own_bearing", "data_sheet", "five_regimes", "friction_and_heat", "orbit",
-    "pareto", "sensitivity",
+    "own_bearing", "data_sheet", "five_regimes", "friction_and_heat", "orbit", "record", "rims", "uplift",
+    "tests_to_friction", "bounds", "fragility", "design_by_gradient", "pareto", "sensitivity",
     "stiffness",
 )  # fmt: skip
 STYLE: dict[str, Any] = {

@@ -1,8 +1,8 @@
 """Sliders that meet their rims
 ============================
 
-For whoever sizes the dishes: one record, stronger from run to run, on a triple pendulum. Force grows with displacement as
-the radii have it, until sliders meet the rims of their dishes, and then several times as fast.
+For whoever sizes the dishes: one record, stronger from run to run, on a triple pendulum. Force grows with displacement
+as the radii have it, until sliders meet the rims of their dishes, and then several times as fast.
 """
 
 import matplotlib.pyplot as plt

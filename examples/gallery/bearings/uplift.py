@@ -21,17 +21,19 @@ effects = Effects(dimension="planar", uplift=True)
 result = simulate(Scene(presets.bearing("prototype-tfp"), Motion.from_arrays(time, path), mass, effects=effects))
 
 # %%
-# How far the bearing opens, and with what force it lands. Steel on a liner has no vertical spring here: a column or a
-# footing below it lowers the force of a landing.
+# How far the top plate leaves its base, and with what force it lands. Steel and liners are all that yields here: a
+# column or a footing below them lowers the force of a landing.
 
-opening = result.dataset["lift"].max("surface")
-landing = result.dataset["normal_force"].max() / (11.4e3 * 9.8)
-print(f"largest opening {1e3 * opening.max():.2f} mm, open for {result.summary['uplift']['duration']:.2f} s")
+data = result.dataset
+rise = (data["top_displacement"] - data["base_displacement"]).sel(axis="E3")
+rise = rise - rise[0]
+landing = data["normal_force"].max() / (11.4e3 * 9.8)
+print(f"rise of the top plate above its base {1e3 * rise.max():.1f} mm")
 print(f"largest normal force {landing:.1f} times the load at rest")
 
 # %%
-# The surfaces open twice, and bounce when they land.
+# Two flights, and a bounce after each.
 
 figure, axes = plt.subplots()
-axes.fill_between(opening["time"], 1e3 * opening)
-axes.set(xlabel="time [s]", ylabel="opening [mm]", xlim=(0.3, 1.6), ylim=(0, None))
+axes.plot(data["time"], 1e3 * rise)
+axes.set(xlabel="time [s]", ylabel="rise above base [mm]", xlim=(0.3, 1.6))

@@ -40,7 +40,7 @@ study(table, folder)
 rows = read_study(folder)
 curve = fragility(rows, "intensity", "peak_displacement", [CAPACITY]).states[0]
 low, high = curve.median_interval
-print(f"half of the motions exceed {1e3 * CAPACITY:.0f} mm at Sa(2.5 s) = {curve.median:.2f} m/s^2 ({low:.2f} to {high:.2f})")
+print(f"half exceed {1e3 * CAPACITY:.0f} mm at Sa(2.5 s) = {curve.median:.2f} m/s^2 ({low:.2f} to {high:.2f})")
 print(f"dispersion {curve.dispersion:.2f}; {curve.exceeded} of {curve.runs} runs exceed it")
 
 # %%

@@ -1,8 +1,8 @@
 """Friction from a test of an isolator
 ===================================
 
-For whoever has a loop from a laboratory: one test of a triple pendulum gives the friction of its surfaces, with intervals
-of 95 %. A run with 2 % of noise stands for the laboratory here; ``fit`` takes CSV files as well.
+For whoever has a loop from a laboratory: one test of a triple pendulum gives the friction of its surfaces, with
+intervals of 95 %. A run with 2 % of noise stands for the laboratory here; ``fit`` takes CSV files as well.
 """
 
 from dataclasses import replace
@@ -20,8 +20,8 @@ force = force + 0.02 * np.abs(force).max() * np.random.default_rng(1).standard_n
 test = Measurement("test 3", data["time"].values, data["displacement"].values, force)
 
 # %%
-# The search starts at the values of the sheet. Inner surfaces slide together and share a value. A symmetric stack has the
-# same loop upside down: that the upper dish is the rougher one is known from the start values alone.
+# The search starts at the values of the sheet. Inner surfaces slide together and share a value. A symmetric stack has
+# the same loop upside down: that the upper dish is the rougher one is known from the start values alone.
 
 start = replace(scene, bearing=scene.bearing.replace(friction=[0.04, 0.02, 0.02, 0.08], contact_damping=1e-4))
 found = fit(start, [test], ["friction[0]", "friction[1]=friction[2]", "friction[3]"])
