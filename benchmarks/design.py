@@ -1,6 +1,6 @@
 """The optimum of the example design_by_gradient against a scan, from other starts, and by finite differences.
 
-Usage: python benchmarks/design.py [scan] [search]; five minutes; prints the table of docs/design.md, draws its figure.
+Usage: python benchmarks/design.py [scan] [search]; five minutes; prints the table of docs/gradients.md, draws its figure.
 """
 
 from __future__ import annotations

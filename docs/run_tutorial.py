@@ -2,7 +2,8 @@
 
 A block marked `sh` contains commands, one per line. A block marked `toml` or `python` is a file named in its first
 line. A block marked `text` is the output of the preceding commands; lines, and the rest of a line after `...`, may be
-left out. The first block of commands of the tutorial installs the package and is not run.
+left out. The first block of commands of the tutorial installs the package and is not run; blocks without a mark are not
+followed.
 """
 
 from __future__ import annotations
@@ -63,6 +64,8 @@ def follow(folder: Path, run: Callable[[str, Path], str] = run, page: Path = PAG
     for language, text in rest:
         if language == "text" and step is not None:
             step = step._replace(shown=text)
+            continue
+        if not language:
             continue
         if step is not None:
             yield step

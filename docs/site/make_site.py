@@ -74,7 +74,7 @@ def collect(source: Path, *, gallery: bool) -> None:
         page.parent.mkdir(parents=True, exist_ok=True)
         page.write_text(re.sub(EXAMPLES, target, path.read_text(encoding="utf-8")), encoding="utf-8")
     (source / "cli.md").write_text(command_page(), encoding="utf-8")
-    for name in () if gallery else ("tutorials.md", "buildings.md"):
+    for name in () if gallery else ("start.md", "buildings.md"):
         page = source / name
         lines = [line for line in page.read_text(encoding="utf-8").splitlines() if "gallery/" not in line]
         page.write_text("\n".join(lines) + "\n", encoding="utf-8")

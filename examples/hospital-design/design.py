@@ -3,7 +3,7 @@
     python examples/hospital-design/design.py            # into the folder hospital-design/ where it is called
     python examples/hospital-design/design.py --short    # two records of 5 s, to see that everything works
 
-docs/hospital-design.md describes it, with the report. A run that was interrupted continues with the same command.
+docs/hospital.md describes it, with the report. A run that was interrupted continues with the same command.
 """
 
 from __future__ import annotations

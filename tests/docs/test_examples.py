@@ -134,7 +134,7 @@ CHECKS: dict[str, dict[str, Any]] = {
     "fragility": {  # docs/studies.md has 3.826 and 0.179 by twelve other scales
         "curve.median": approx(3.826, rel=0.03), "curve.dispersion": approx(0.179, rel=0.1),
     },
-    "design_by_gradient": {  # docs/design.md, confirmed by a scan (benchmarks/design.py)
+    "design_by_gradient": {  # docs/gradients.md, confirmed by a scan (benchmarks/design.py)
         "[friction, radius, shear]": approx([0.0836, 1.252, 0.1700], rel=2e-3),
         "steps[-1, :, 0].tolist()": approx([0.2, 0.2], rel=1e-3),
         "bool(found.success and found.nit <= 12)": True,
@@ -182,7 +182,7 @@ def test_an_example_of_the_gallery_is_short_and_uses_public_names() -> None:
 
 
 def test_the_design_page_shows_the_code_of_its_example() -> None:
-    page = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "gradients.md").read_text(encoding="utf-8").split("\n## A design by gradient\n")[1]
     shown = re.findall(r"^```python\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
     code = GALLERY["design_by_gradient"].read_text(encoding="utf-8")
     parts = [part for block in shown for part in block.strip().split("\n\n\n")]

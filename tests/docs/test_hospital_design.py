@@ -20,7 +20,7 @@ from msfp_gen.motions.records.scaling import read_spectrum
 from msfp_gen.scene.file.loader import load_sheet, toml_file
 
 FOLDER = ROOT / "examples" / "hospital-design"
-PAGE = (ROOT / "docs" / "hospital-design.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "hospital.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture

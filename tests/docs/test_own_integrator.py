@@ -30,7 +30,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 def run(space: dict[str, Any]) -> None:
     """Run the command and the blocks of the page."""
-    text = PAGE.read_text(encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8").split("\n## The equations in SymPy\n")[0]
     command = re.search(r"^msfp-gen (generate .*)$", text, re.MULTILINE)
     assert command is not None and main(command[1].split()) == 0
     for block in re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL):

@@ -16,9 +16,6 @@ from msfp_gen.cli import main
 README, COMMANDS = ((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/commands.md"))
 
 
-SITE = "".join(path.read_text(encoding="utf-8") for path in ROOT.glob("docs/site/*.md"))
-
-
 def blocks(language):
     return re.findall(rf"^```{language}\n(.*?)^```$", README + COMMANDS, flags=re.MULTILINE | re.DOTALL)
 
@@ -76,7 +73,7 @@ def test_every_page_is_linked_and_every_link_leads_somewhere():
             target = (folder / link).resolve() if link else page
             assert target.exists(), f"{page.name}: {link}"
             assert not anchor or anchor in anchors(target), f"{page.name}: {link}#{anchor}"
-    linked = set(re.findall(r"\(docs/([\w-]+)\.md", README)) | set(re.findall(r"\(docs/([\w-]+)\.md", SITE))
+    linked = set(re.findall(r"\(docs/([\w-]+)\.md", README))
     assert linked == {page.stem for page in ROOT.glob("docs/*.md")}
 
 
