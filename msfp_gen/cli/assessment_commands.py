@@ -229,6 +229,7 @@ def fit(
         Path | None,
         typer.Option(metavar="FILE.html", help="Write a page with values, limits, loops and residuals; no network."),
     ] = None,
+    sign: SignOption = DEFAULT,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
@@ -242,6 +243,7 @@ def fit(
     from msfp_gen.studies.calibration.fit_result import fit_tables
     from msfp_gen.studies.calibration.fitting import end_fit, start_fit
 
+    sign_of(sign, "--sign")
     if report is not None:
         check_output(report, REPORT_SUFFIXES, "--report")
     chosen = load_bearing_scene(scene)
@@ -265,8 +267,9 @@ def fit(
         prepared.progress = show_evaluation
         result = end_fit(chosen, prepared)
     answer(result.as_dict(), fit_tables(result), as_json)
-    written = [] if output is None else result.save(output)
-    note_written([*written, *([] if report is None else [write_fit_report(result, report)])])
+    with using_sign(sign):
+        written = [] if output is None else result.save(output)
+        note_written([*written, *([] if report is None else [write_fit_report(result, report)])])
 
 
 def _measurements(

@@ -16,6 +16,7 @@ from msfp_gen.cli.console import (
     Force,
     Progress,
     SceneName,
+    SignOption,
     Workers,
     answer,
     note,
@@ -30,6 +31,7 @@ from msfp_gen.cli.console import (
 from msfp_gen.common.errors import RunError
 from msfp_gen.common.output import check_output, make_folder
 from msfp_gen.common.tables import TABLE_SUFFIXES
+from msfp_gen.results.sign import DEFAULT, sign_of, using_sign
 
 if TYPE_CHECKING:
     from msfp_gen.scene.system import System
@@ -68,6 +70,7 @@ def batch(
         typer.Option(metavar="FILE", help="Write one row for each run, varied fields included: .csv or .parquet."),
     ] = None,
     workers: Workers = None,
+    sign: SignOption = DEFAULT,
     force: Force = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print summaries and varied fields as JSON, and nothing else.")
@@ -79,6 +82,7 @@ def batch(
     from msfp_gen.studies.batch import ENDED
     from msfp_gen.studies.sweep import variations, varied_field
 
+    sign_of(sign, "--sign")
     if table is not None:
         check_output(table, TABLE_SUFFIXES, "--table")
     fields = [varied_field(text) for text in vary or ()]
@@ -87,7 +91,7 @@ def batch(
     chosen = [variation for source in sources for variation in variations(source, fields, records)]
     require_meant(*(variation.scene for variation in chosen), force=force)
     rows: list[Row] = []
-    with _reported(rows, len(chosen), table, as_json):
+    with _reported(rows, len(chosen), table, as_json), using_sign(sign):
         _run(chosen, workers, output, rows)
     if failed := [row.summary for row in sorted(rows) if row.summary["status"] not in ENDED]:
         first = f"{failed[0]['name']}: {failed[0]['message']}"

@@ -167,13 +167,14 @@ class Fit:
         return [folder / name for name in (*texts, "residuals.csv", "fit.png")]
 
     def _columns(self) -> dict[tuple[str, str], list[Any]]:
-        """(name, unit) of each column of `residuals.csv` -> values at all times of all tests."""
+        """(name, unit) of a column of `residuals.csv` -> values of all tests, in the sign of outputs."""
+        sign = shown_sign().factor
         rows: dict[tuple[str, str], Any] = {
             ("time", "s"): [test.measured.time for test in self.tests],
-            ("displacement", "m"): [test.measured.displacement for test in self.tests],
-            ("measured force", "N"): [test.measured.force for test in self.tests],
-            ("fitted force", "N"): [test.force for test in self.tests],
-            ("residual", "N"): [test.residual for test in self.tests],
+            ("displacement", "m"): [sign * test.measured.displacement for test in self.tests],
+            ("measured force", "N"): [sign * test.measured.force for test in self.tests],
+            ("fitted force", "N"): [sign * test.force for test in self.tests],
+            ("residual", "N"): [sign * test.residual for test in self.tests],
         }
         names = [test.measured.name for test in self.tests for _ in test.force]
         return {("test", ""): names, **{key: np.concatenate(values).tolist() for key, values in rows.items()}}

@@ -72,7 +72,15 @@ def test_exported_tables_state_and_change_the_sign(tmp_path: Path) -> None:
 def test_another_word_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(InputError, match="sign = 'up': give one of base-top, top-base"), figures.using_sign("up"):
         raise AssertionError("drawn")
-    suffixes = {"plot": ".png", "animate": ".gif", "export": ".csv", "run": ".nc", "report": ".html", "bound": ""}
+    suffixes = {
+        "plot": ".png",
+        "animate": ".gif",
+        "export": ".csv",
+        "run": ".nc",
+        "report": ".html",
+        "bound": "",
+        "batch": "",
+    }
     for command, suffix in (suffixes | {"explore": ".html"}).items():
         assert main([command, "fenz-test1", "-o", str(tmp_path / f"a{suffix}"), "--sign", "up"]) == 2
         assert capsys.readouterr().err == "error: --sign = 'up': give one of base-top, top-base\n"
@@ -149,6 +157,19 @@ def test_one_setting_turns_every_output(output: Any, tmp_path: Path) -> None:
     assert np.abs(before).max() > 0
     np.testing.assert_array_equal(after, -before)
     assert "base - top" in said and "top - base" in says
+
+
+def test_runs_of_a_batch_are_written_in_the_sign_of_the_command(tmp_path: Path) -> None:
+    import xarray as xr
+
+    for sign in SIGNS:
+        assert main(["batch", "fenz-test1", "-o", str(tmp_path / sign), "--sign", sign]) == 0
+    with (
+        xr.open_dataset(next((tmp_path / "base-top").iterdir()), engine="h5netcdf") as one,
+        xr.open_dataset(next((tmp_path / "top-base").iterdir()), engine="h5netcdf") as other,
+    ):
+        np.testing.assert_array_equal(one["displacement"], -other["displacement"])
+        assert np.abs(one["displacement"]).max() > 0
 
 
 @cache

@@ -282,7 +282,7 @@ def test_the_command_writes_a_scene_that_loads(tmp_path: Path, capsys: pytest.Ca
     command = ["fit", str(scene), str(test), "-p", "friction[0],friction[1]=friction[2]"]
     command += ["--bounds", "friction[0]=0.01:0.09", "--axial-load", "112e3", "--weights", "2", "--offset"]
     page = tmp_path / "fit.html"
-    assert main([*command, "--json", "-o", str(out), "--report", str(page)]) == 0
+    assert main([*command, "--json", "-o", str(out), "--report", str(page), "--sign", "top-base"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["estimates"][0]["value"] == pytest.approx(TRUE[0], rel=0.02)
     assert {path.name for path in out.iterdir()} == {"scene.toml", "fit.json", "residuals.csv", "fit.png"}
@@ -294,6 +294,9 @@ def test_the_command_writes_a_scene_that_loads(tmp_path: Path, capsys: pytest.Ca
         found["estimates"][0]["bounds"] == pytest.approx([0.01, 0.09])
         and found["estimates"][-1]["bounds"] == [None] * 2
     )
+    rows = np.genfromtxt(out / "residuals.csv", delimiter=",", skip_header=1)[:, 2:4]
+    assert rows == pytest.approx(-np.column_stack([measured(0.05).displacement, measured(0.05).force]), rel=1e-12)
+    assert "top − base" in page.read_text(encoding="utf-8")
     assert len((out / "residuals.csv").read_text().splitlines()) == ROWS + 1
     assert tomllib.loads((out / "scene.toml").read_text())["bearing"]["surfaces"][1]["friction"] != 0.0136
     assert main(command) == 0
