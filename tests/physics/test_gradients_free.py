@@ -116,7 +116,7 @@ def rims_heated() -> tuple[Scene, dict[str, float]]:
     bearing = scene.bearing.replace(friction_slow=None, reference_pressure=5e6, velocity_rate=100.0, conductivity=0.5)
     scene = replace(scene, bearing=bearing, effects=Effects(friction="pvt"))
     assert simulate(scene).history.temperature.max() > 40.0
-    law = {"bearing.surfaces[0].start_temperature": 4e-3, "bearing.surfaces[0].conductivity": 4e-3}
+    law = {"bearing.surfaces[0].start_temperature": 4e-2, "bearing.surfaces[0].conductivity": 4e-3}
     return scene, {path: size for path, size in sizes.items() if path in COMMON or "surfaces[1]" in path} | law
 
 

@@ -296,7 +296,7 @@ def test_the_command_writes_a_scene_that_loads(tmp_path: Path, capsys: pytest.Ca
     )
     rows = np.genfromtxt(out / "residuals.csv", delimiter=",", skip_header=1)[:, 2:4]
     assert rows == pytest.approx(-np.column_stack([measured(0.05).displacement, measured(0.05).force]), rel=1e-12)
-    assert "top − base" in page.read_text(encoding="utf-8")
+    assert "top less base" in page.read_text(encoding="utf-8")
     assert len((out / "residuals.csv").read_text().splitlines()) == ROWS + 1
     assert tomllib.loads((out / "scene.toml").read_text())["bearing"]["surfaces"][1]["friction"] != 0.0136
     assert main(command) == 0
