@@ -14,7 +14,9 @@ from msfp_gen.figures.style import COLOURS, PALE
 ORDER = (
     "own_bearing", "data_sheet", "five_regimes", "friction_and_heat", "orbit", "record", "rims", "uplift",
     "tests_to_friction", "bounds", "fragility", "design_by_gradient", "pareto", "sensitivity",
-    "stiffness",
+    "hospital", "torsion", "floor_spectra",
+    "stiffness", "own_integrator",
+    "audit", "opensees",
 )  # fmt: skip
 STYLE: dict[str, Any] = {
     "axes.axisbelow": True,
