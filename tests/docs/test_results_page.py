@@ -75,7 +75,9 @@ def test_commands_print_what_the_page_shows(tmp_path: Any, capsys: pytest.Captur
     assert main(["run", "fenz-test5", "-o", saved]) == 0 and main(["characterise", saved]) == 0
     printed = capsys.readouterr().out.splitlines()
     shown = PAGE.split("```text\n")[1].split("```")[0].splitlines()
-    assert len(shown) == 6 and set(shown) <= set(printed)
+    assert len(shown) == 6
+    for line in shown:
+        assert any(other.startswith(line.removesuffix(" ...")) for other in printed), line
 
 
 def test_the_page_has_every_limit() -> None:
