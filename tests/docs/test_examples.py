@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import runpy
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -175,15 +174,13 @@ CHECKS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in GALLERY]
 )
-def test_an_example_of_the_gallery_computes_what_is_known(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_example_of_the_gallery_computes_what_is_known(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     text = GALLERY[name].read_text(encoding="utf-8")
     for library in re.findall(r"^(?:from|import) (SALib|pymoo|openseespy)", text, re.MULTILINE):
         pytest.importorskip(library)
     pyplot = pytest.importorskip("matplotlib.pyplot")
     pyplot.switch_backend("agg")
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.chdir(GALLERY[name].parent)
     names = runpy.run_path(str(GALLERY[name]))
     drawn = pyplot.get_fignums()
     pyplot.close("all")

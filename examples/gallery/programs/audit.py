@@ -13,7 +13,8 @@ import pandas as pd
 
 from msfp_gen import audit
 
-FOLDER = Path(__file__).parents[2] / "basemat"  # examples/basemat of the repository
+FOLDERS = Path("examples/basemat"), Path("../../basemat")  # from the repository, from the folder of this example
+FOLDER = next(folder for folder in FOLDERS if folder.is_dir())
 found = audit(FOLDER / "case1.csv", FOLDER / "bearing.toml", FOLDER / "map.toml")
 print(found.text)
 for finding in found.findings:
