@@ -70,7 +70,7 @@ class Audit:
 
     @property
     def as_dict(self) -> dict[str, Any]:
-        """As plain data: name, bearing, text, findings."""
+        """The audit as plain data: name, bearing, text, findings."""
         return {
             "name": self.name,
             "bearing": self.bearing,

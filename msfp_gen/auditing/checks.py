@@ -80,13 +80,13 @@ class Finding:
 
     @property
     def as_dict(self) -> dict[str, Any]:
-        """As plain data, without the drawing."""
+        """The finding as plain data, without the drawing."""
         names = ("check", "title", "verdict", "sentence", "value", "unit", "time")
         return {name: getattr(self, name) for name in names}
 
 
 class Answer(NamedTuple):
-    """The answer of a check, without its name: as of `Finding`."""
+    """The answer of a check, without its name: see `Finding`."""
 
     verdict: str
     sentence: str
@@ -213,7 +213,7 @@ def sampling(case: AuditCase) -> Answer:
     if straight:
         text = (
             f"the force is straight between every {straight}th row, so that the rows were interpolated from a step of "
-            f"{straight * data.step:.3g} s: velocity and friction between them are not those of the analysis"
+            f"{straight * data.step:.3g} s: velocity and friction between them do not come from the analysis"
         )
         return Answer(INCONSISTENT, text, straight * data.step, "s")
     if not work[-1]:
@@ -327,7 +327,7 @@ def mass(case: AuditCase) -> Answer:
         text = (
             f"force and acceleration are proportional only to {100 * found.correlation**2:.3g} % "
             "(squared correlation): "
-            "the acceleration is not that of all the mass above; a column of the mean acceleration would decide"
+            "the acceleration does not belong to all the mass above; a column of the mean acceleration would decide"
         )
         return Answer(OPEN, text, found.correlation**2, NONE)
     carried = case.data.at_rest * case.data.bearings / case.stated.bearing.gravity
@@ -362,7 +362,7 @@ def vertical_mass(case: AuditCase) -> Answer:
     if not found.one_mass:
         return Answer(
             OPEN,
-            "the axial force does not follow this vertical acceleration; that of the mass on this bearing would decide",
+            "the axial force does not follow this vertical acceleration; one of the mass on this bearing would decide",
         )
     ratio = found.mass * gravity / (data.at_rest * data.bearings)
     text = (
@@ -566,7 +566,7 @@ def coupling(case: AuditCase) -> Answer:
     if factor.agrees(1.0, COUPLING_FLOOR):
         return Answer(CONSISTENT, text, factor.value, NONE)
     worst = int(rows[np.abs(data.axial[rows] - data.at_rest).argmax()])
-    hint = ": friction and stiffness are those of a constant axial force" if factor.agrees(0.0, COUPLING_FLOOR) else ""
+    hint = ": friction and stiffness belong to a constant axial force" if factor.agrees(0.0, COUPLING_FLOOR) else ""
     drawing = Drawing(
         [("axial force / at rest", thinned(data.time), thinned(data.axial / data.at_rest))],
         "time [s]", "axial force / at rest",

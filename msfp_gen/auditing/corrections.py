@@ -97,7 +97,7 @@ def _units(data: Histories, stated: Stated) -> tuple[dict[str, float], Answer | 
         return factors, Answer(INCONSISTENT, f"{text}; it is put right in what follows", value)
     if ratio > FAR:
         text = (
-            f"sizes are off by a factor of up to {ratio:.3g} from those of the bearing, and no other unit of one "
+            f"sizes differ from the bearing's by a factor of up to {ratio:.3g}, and no other unit of one "
             "quantity explains it; the other checks say what differs"
         )
         return {}, Answer(OPEN, text, ratio)
@@ -105,7 +105,7 @@ def _units(data: Histories, stated: Stated) -> tuple[dict[str, float], Answer | 
 
 
 def _other_acceleration(data: Histories, stated: Stated) -> tuple[dict[str, float], str, float] | None:
-    """The unit of acceleration with which the inertia is that of the weight; None: there is none."""
+    """The unit of acceleration with which inertia and weight have the same mass; None: there is none."""
     inertia = momentum(data)
     if inertia is not None and inertia.one_mass and "axial" in data.columns:
         ratio = inertia.mass / (data.at_rest * data.bearings / stated.bearing.gravity)

@@ -26,7 +26,7 @@ from msfp_gen.specification.layout import Auto
 LEAST_LOAD = 0.02  # axial force over that at rest, below which surfaces may part
 HOLD = 5e3  # stiffness of the rig over the axial force at rest [1/m]: it moves some hundredths of a millimetre
 RELAXED = 1e-3  # damping of the rig over its stiffness [s]
-SAME_MOTION = 0.02  # RMS difference of the displacement from that of the ends, over its own
+SAME_MOTION = 0.02  # RMS difference between the displacement and the motion of the ends, over the RMS displacement
 ENDS = ("lower", "upper")
 
 

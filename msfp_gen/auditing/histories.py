@@ -14,7 +14,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite
 from msfp_gen.results.geometry import body_bases
 
-# Column -> unit and meaning; the number is that of the axis: 1, 2 horizontal, 3 upwards.
+# Column -> unit and meaning; the number is the axis: 1, 2 horizontal, 3 upwards.
 QUANTITIES: dict[str, tuple[str, str]] = {
     "time": ("s", "time"),
     **{f"displacement_{i}": ("m", "horizontal displacement across the bearing, of either sign") for i in (1, 2)},
@@ -82,7 +82,7 @@ class Histories:
         return self.columns["time"]
 
     def missing(self, *names: str) -> list[str]:
-        """Those of these columns that are not there; `force` and `displacement` stand for one axis at least."""
+        """Names without a column; `force` and `displacement` stand for one axis at least."""
         return [name for name in names if name not in self.columns and f"{name}_1" not in self.columns and
                 f"{name}_2" not in self.columns]  # fmt: skip
 

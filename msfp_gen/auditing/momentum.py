@@ -1,7 +1,7 @@
 """Force against acceleration of the supported mass, in windows: the balance of momentum without differentiation.
 
-A window is a smooth weight w over some tenths of a second. The mean of a force under w is compared with that of the
-acceleration, or of the position x under w'': the integral of x w'' is that of x'' w. Both are smoothed alike.
+A window is a smooth weight w over some tenths of a second. The mean of a force under w is compared with the mean of the
+acceleration, or of the position x under w'': the integrals of x w'' and x'' w are the same. Both are smoothed alike.
 """
 
 from __future__ import annotations

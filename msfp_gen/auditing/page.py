@@ -140,7 +140,7 @@ def shadow_opinion(shadow: Shadow) -> Opinion:
 
 
 def _loops(shadow: Shadow) -> list[Finding]:
-    """The force of both over the displacement, along every axis of which there is a force."""
+    """The force of both over the displacement, along every axis with a force."""
     found, data = [], shadow.data
     for axis in range(2):
         force, own = data.force[:, axis], shadow.force[:, axis]
@@ -156,7 +156,7 @@ def _loops(shadow: Shadow) -> list[Finding]:
 
 
 def _differences(shadow: Shadow) -> list[Finding]:
-    """The recorded histories less those of the model, with a ring at the largest difference."""
+    """The recorded histories less the computed ones, with a ring at the largest difference."""
     found, time = [], shadow.data.time
     for one, (recorded, own) in zip(shadow.differences, shadow.histories.values(), strict=True):
         scale, unit = SHOWN_UNITS.get(one.unit, (1.0, one.unit))

@@ -33,13 +33,13 @@ from msfp_gen.specification.friction_laws import BUILT_IN
 OFF_CENTRE = 0.05  # permitted first displacement over the largest
 SURFACES = ("sliding", "slip_speed", "temperature")  # columns with the number of a surface
 BOUNCES = 0.05  # closed for less, surfaces bounce [s]
-TIGHTER = 0.1  # tolerance of the run that states the error, over that of the shadow
-NEARER = 0.8  # difference without an effect over that with it, below which the element does not have the effect
+TIGHTER = 0.1  # tolerance of the run that states the error, over the shadow's
+NEARER = 0.8  # difference without an effect over the one with it, below which the element does not have it
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """The model without one more effect.
+    """What the model without one more effect shows.
 
     Attributes:
         effect: its name.
@@ -58,7 +58,7 @@ class LeftOut:
 
 
 class Difference(NamedTuple):
-    """A recorded history against that of the model.
+    """A recorded history against the computed one.
 
     quantity: name of the column without its number. surface: 1 at the bottom; 0: of the whole bearing. rms, largest:
     [unit]. size: largest recorded value, of temperatures their rise [unit]. time: of the largest difference [s].
@@ -124,7 +124,7 @@ class Shadow:
 
     @cached_property
     def differences(self) -> tuple[Difference, ...]:
-        """The recorded histories against those of the model: the force, and what surfaces did."""
+        """The recorded histories against the computed ones: the force, and what surfaces did."""
         return tuple(self._difference(*key, *pair) for key, pair in self.histories.items())
 
     def _difference(self, quantity: str, surface: int, recorded: Array, own: Array) -> Difference:
@@ -139,7 +139,7 @@ class Shadow:
 
     @cached_property
     def openings(self) -> list[tuple[float, float]]:
-        """Times in which any surface is open in the model, as (start, length) [s]; those of one lift-off bounce."""
+        """Times in which any surface is open in the model, as (start, length) [s]; openings of one lift-off bounce."""
         if self.opened is None:
             return []
         found = open_times(self.opened.alone.history, self.opened.events)
@@ -169,7 +169,7 @@ class Shadow:
 
     @property
     def difference(self) -> float:
-        """RMS difference of the recorded force from that of the model, over the largest force [-]."""
+        """RMS difference between the recorded and the computed force, over the largest force [-]."""
         return _difference(self.force, self.data)
 
     @property
@@ -232,7 +232,7 @@ class Shadow:
 
     @property
     def as_dict(self) -> dict[str, Any]:
-        """As plain data: differences, effects, and the summary of the run of the model."""
+        """The comparison as plain data: differences, effects, and the summary of the run of the model."""
         return {
             "name": self.data.name,
             "bearing": self.stated.name,
@@ -257,12 +257,12 @@ class Shadow:
 def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | None = None) -> Shadow:
     """Drive the full model of a bearing by the recorded motion and axial force, and compare what it does.
 
-    The motion is that of both plates where there are columns of them, else the displacement across the bearing. Where
-    the axial force is nearly zero or tension, surfaces part.
+    Both plates move as recorded where there are columns of them, else the ends move by the displacement across the
+    bearing. Where the axial force is nearly zero or tension, surfaces part.
 
-    Args: as of `audit`.
+    Args: see `audit`.
 
-    Raises InputError: as of `audit`, a column that is missing, or a record that does not begin at the centre. RunError:
+    Raises InputError: see `audit`, a column that is missing, or a record that does not begin at the centre. RunError:
     the model cannot follow the motion.
     """
     stated = stated_of(bearing)

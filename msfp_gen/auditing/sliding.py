@@ -34,7 +34,7 @@ ERRORS = 3.0  # standard errors within which two values agree
 class FittedFactor(NamedTuple):
     """A fitted factor, its standard error, and the factor of the other theory where that fits as well.
 
-    The theories are those of small angles, which most programs have, and of links that turn by any angle.
+    There are two theories: small angles, which most programs have, and links that turn by any angle.
     """
 
     value: float

@@ -2,7 +2,7 @@
 
 The links of a stack are the distances between the centres of its spheres. A link that tilts by an angle a under an
 axial force N and a horizontal force F is in balance where F L - N L a = m - m', with moments of at most mu N R about
-the centres at its two ends. The sum over all links leaves those of the outermost surfaces: F/N - u/L is at most
+the centres at its two ends. The sum over all links leaves the moments of the outermost surfaces: F/N - u/L is at most
 (mu_1 R_1 + mu_k R_k)/L, with L the distance of the outermost centres, whatever the surfaces between them do; it is that
 while both outermost surfaces slide the same way.
 """

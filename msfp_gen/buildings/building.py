@@ -172,7 +172,7 @@ class Building(Printed):
             if node.carries:
                 own = np.flatnonzero(np.any(node.rows, axis=0)).tolist()
                 if (shared := first.keys() & set(own)) and not _linked(node, [first.get(index) for index in own]):
-                    raise InputError(f"building.nodes[{node.name!r}]: coordinate {min(shared)} is that of another node")
+                    raise InputError(f"building.nodes[{node.name!r}]: coordinate {min(shared)} belongs to another node")
                 if len(own) != FREEDOMS or np.linalg.matrix_rank(node.rows[:, own]) < FREEDOMS:
                     raise InputError(f"building.nodes[{node.name!r}] depends on {own}: give six different coordinates")
                 boundary += [] if shared else own
@@ -264,7 +264,7 @@ class Building(Printed):
 
     def _damped(self, ratio: float | Sequence[float], frequencies: tuple[float, float] | None) -> Building:
         """The building with damping of its modes on fixed attachments, or Rayleigh damping C = a M + b K."""
-        # ratio, frequencies: as of `shear`. M: of the motion relative to the attachments. Raises InputError.
+        # ratio, frequencies: see `shear`. M: of the motion relative to the attachments. Raises InputError.
         ratios = np.atleast_1d(np.asarray(ratio, dtype=float))
         if ratios.ndim != 1 or not ratios.size or not np.all((ratios >= 0) & (ratios < 1)):
             raise InputError(f"building.damping_ratio = {ratio!r}: give a number, or a list, from 0 to below 1")
@@ -329,7 +329,9 @@ def _node(name: str, indices: Sequence[int], position: ArrayLike, count: int) ->
     path = f"building.nodes[{name!r}]"
     own = np.asarray(indices)
     if own.shape != (FREEDOMS,) or own.dtype.kind not in "iu" or len(set(own.tolist())) < FREEDOMS:
-        raise InputError(f"{path}: {list(indices)} are not six different indices; give those of u1 ... and rotations")
+        raise InputError(
+            f"{path}: {list(indices)} are not six different indices; give one each for u1 ... and rotations"
+        )
     if own.min() < 0 or own.max() >= count:
         raise InputError(f"{path}: {own.tolist()} has an index outside of 0 ... {count - 1}")
     place = np.asarray(position, dtype=float)

@@ -218,7 +218,7 @@ VARIABLES = STORED | DERIVED
 
 
 def arrays_of(result: Any) -> Arrays:
-    """Field -> array, as of `Variable.field`, of which the variables are parts."""
+    """Field, as in `Variable.field`, -> array; the variables are parts of these arrays."""
     nodes, bearings = result.scene.building.nodes, result.bearings
     lists = {
         "node": [result.node(node.name) for node in nodes],
@@ -256,7 +256,7 @@ def labels_of(scene: BuildingScene) -> Labels:
 
 
 def columns(scene: BuildingScene) -> Places:
-    """The columns of a table of all rows, as of `column_places`, without surfaces that a bearing does not have."""
+    """The columns of a table of all rows, as in `column_places`, without surfaces that a bearing does not have."""
     surfaces = [bearing.layout.surfaces for bearing in scene.every_bearing]
     return {
         name: (variable, index)
@@ -282,7 +282,7 @@ def _group_of(arrays: Mapping[str, Array], dims: Dimensions) -> xr.Dataset:
 
 
 def _arrays_in(root: StoredGroup, name: str, dims: Dimensions, sizes: Mapping[str, int]) -> Arrays:
-    """The arrays of the group `name`, as of `_group_of`."""
+    """The arrays of the group `name`, with the arguments of `_group_of`."""
     group = root.group(name)
     return {key: group.array(key, tuple(sizes[dim] for dim in dims_of)) for key, dims_of in dims.items()}
 

@@ -1,6 +1,6 @@
 """Extremes of a building over all steps of its run, whatever the times of the rows.
 
-The scene gives the vectors of which the compiled run keeps peaks; its numbers become `BuildingExtremes`.
+The scene gives the vectors whose peaks the compiled run keeps; its numbers become `BuildingExtremes`.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ DIMENSIONS = {
 
 
 def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:
-    """The vectors of a building of which the compiled run keeps peaks, in the order of `BuildingExtremes.of_run`.
+    """The vectors of a building whose peaks the compiled run keeps, in the order of `BuildingExtremes.of_run`.
 
     A vector is its rows times a derivative of the coordinates, less shares of the motions of the ground. Returns the
     orders of the derivatives; the rows, shape (vectors, 3, n) [SI]; and the shares, shape (vectors, grounds) [-].

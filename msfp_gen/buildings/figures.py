@@ -62,7 +62,7 @@ def plot_profile(result: BuildingResult, path: str | Path | None = None) -> Figu
 def plot_floor_spectra(result: BuildingResult, path: str | Path | None = None) -> Figure:
     """Response spectra of the accelerations of all floors and of the ground, 5 % damping, along E1, E2 and E3.
 
-    Of a rigid floor at its centre of mass, and dotted the largest at the corners of the plan.
+    The spectra of a rigid floor are at its centre of mass; dotted lines are the largest at the corners of the plan.
     """
     found = result.floor_spectra()
     spectra = {"ground": response_spectrum(result.scene.motion, found.periods, damping=found.damping).psa[:, :3]}
@@ -94,7 +94,7 @@ def plot_floor_spectra(result: BuildingResult, path: str | Path | None = None) -
 
 
 def plot_axial_forces(result: BuildingResult, path: str | Path | None = None) -> Figure:
-    """Axial force of every bearing: over time, over that at rest, and the range of each."""
+    """Axial force of every bearing: over time, relative to the axial force at rest, and the range of each."""
     with page(11.5, max(4.6, 1.5 + 0.22 * len(result.scene.bearings)), path) as figure:
         headline(figure, title_of(result))
         left, right = figure.subplots(1, 2, width_ratios=(1.6, 1))

@@ -51,7 +51,7 @@ COMMON = ("interface", "soil", "effects")  # tables of [building] for all bearin
 class FrameTable:
     """The plain keys of the table `[building]`.
 
-    mass, stiffness, damping: files of matrices, as of `Building.from_matrices`, in place of base and storeys.
+    mass, stiffness, damping: files of matrices, as in `Building.from_matrices`, in place of base and storeys.
     damping_ratio, rayleigh_frequencies [Hz]: as in `Building.shear`. highest_frequency: as `frequency` of
     `Building.reduced` [Hz].
     """
@@ -231,7 +231,7 @@ def stored_bearing(row: SceneTable, index: int) -> BuildingBearing:
 def _bearing(
     row: SceneTable, path: str, named: SceneTable, folder: Path | None, bearings: dict[str, Bearing]
 ) -> BuildingBearing:
-    """A bearing from the table `[[building.bearing]]` at `path`. named, bearings: as of `_bearing_values`."""
+    """A bearing from the table `[[building.bearing]]` at `path`. named, bearings: see `_bearing_values`."""
     values = dict(row)
     if "interface" not in values:
         raise InputError(f"{path}.interface is missing: give this table, or [building.interface] for all bearings")
@@ -262,7 +262,7 @@ def _bearing_values(source: Any, path: str, named: SceneTable, bearings: dict[st
         bearing = bearing_from_table(named[source] if in_file else source)
     except InputError as error:
         others = isinstance(source, str) and not in_file and named
-        names = f"; those of [bearings] are {', '.join(named)}" if others else ""
+        names = f"; [bearings] has {', '.join(named)}" if others else ""
         raise InputError(place + str(error).removeprefix("bearing") + names) from None
     if isinstance(source, str):
         bearings[source] = bearing

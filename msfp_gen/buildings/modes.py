@@ -68,7 +68,7 @@ def mode_table(modes: Modes) -> Table:
 
 
 def plot_modes(scene: BuildingScene, modes: Modes, path: str | Path | None = None) -> Figure:
-    """Shapes of the lowest modes over the height. path: as of `plot_plan`."""
+    """Shapes of the lowest modes over the height. path: see `plot_plan`."""
     nodes = scene.building.nodes
     order = np.argsort([node.position[2] for node in nodes])
     heights = [float(nodes[index].position[2]) for index in order]

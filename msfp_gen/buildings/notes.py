@@ -73,7 +73,7 @@ def shared(notes: Iterable[Note]) -> list[Note]:
 
 
 def _with_others(note: Note, alike: Sequence[Note], addition: str = "") -> Note:
-    """The note, with the number of other bearings of which there is such a note."""
+    """The note, with the number of other bearings that have such a note."""
     others = len({other.bearing for other in alike}) - 1
     words = f"; the same holds for {others} other bearing{'s' * (others > 1)}{addition}"
     return replace(note, text=note.text + (words if others else ""))

@@ -86,7 +86,7 @@ class Oscillators:
 
 def _damping_of(motions: Array, held: int, mass: Array, damping: Array, stiffness: Array, frequency: float) -> Array:
     """Damping in the coordinates of some motions, shape (motions, motions) [SI]; what rounding leaves is zero."""
-    # The first `held` motions are those of attachments. frequency: circular, with which forces of masses and of
+    # The first `held` motions are motions of attachments. frequency: circular, with which forces of masses and of
     # springs are compared [rad/s].
     sizes = [np.einsum("ij,ij->j", motions, matrix @ motions) for matrix in (mass, stiffness)]
     scale = np.sqrt(np.maximum(sizes[0] * frequency + sizes[1] / frequency, 0.0))

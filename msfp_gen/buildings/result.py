@@ -31,7 +31,7 @@ from msfp_gen.scene.fidelity import Backbone
 class BuildingResult(AnyResult):
     """The result of `simulate` for a building; a RunError has one in `.result` if the run failed after its start.
 
-    Motion of the building, and forces and sliding of its bearings, at k times.
+    It has the motion of the building, and the forces and the sliding of its bearings, at k times.
 
     Attributes:
         time: ndarray, shape (k,) [s].
@@ -44,8 +44,8 @@ class BuildingResult(AnyResult):
             [N, N m].
         normal_force, rim_force: of the surfaces of each bearing, shape (k, bearings, most surfaces) [N]; NaN where a
             bearing has no such surface.
-        sliding, lift: sliding and clearance between separated faces, shape as of normal_force [m].
-        temperature: of the surfaces, of the start where a model has none, shape as of normal_force [degC].
+        sliding, lift: sliding and clearance between separated faces, shape (k, bearings, most surfaces) [m].
+        temperature: of the surfaces, of the start where a model has none, shape (k, bearings, most surfaces) [degC].
         dissipated: in each bearing, shape (k, bearings) [J].
         interface_dissipated: by the dampers of each interface, shape (k, bearings) [J].
         stored: in each bearing and the springs of its interface, shape (k, bearings) [J].
@@ -144,7 +144,7 @@ class BuildingResult(AnyResult):
 
     @property
     def overturning_moment(self) -> Array:
-        """Moment that accelerates the building about E1 and E2, as of `overturning` in extremes.py, (k, 2) [N m]."""
+        """Moment that accelerates the building about E1 and E2, as in `overturning` in extremes.py, (k, 2) [N m]."""
         moment: Array = self.acceleration @ overturning(self.scene).T
         return moment
 
@@ -177,7 +177,7 @@ class BuildingResult(AnyResult):
     def potential(self) -> Array:
         """Potential energy of the weights, from the position at rest, shape (k,) [J].
 
-        The work against the loads of the bearings at rest, which carry weights and static strains.
+        It is the work against the loads of the bearings at rest, which carry weights and static strains.
         """
         raised = self.displacement @ self.scene.attachments[:, 2].T
         energy: Array = raised @ self.scene.axial_loads
@@ -354,18 +354,18 @@ class BuildingResult(AnyResult):
 
     @property
     def figures(self) -> Mapping[str, Any]:
-        """The figures of the run by their names, as of `figures.figures_of`."""
+        """The figures of the run by their names; see `figures.figures_of`."""
         return self.scene.figures
 
     def film(self, times: Array, azimuth: float | None) -> Any:
-        """The movie of the run, as of `figures.movie.film_of`."""
+        """The movie of the run; see `figures.movie.film_of`."""
         from msfp_gen.buildings.movie import building_film
 
         return building_film(self, times, azimuth)
 
     @property
     def page(self) -> Any:
-        """What a report has of the run, as of `report.page.page_of`."""
+        """What a report has of the run; see `report.page.page_of`."""
         from msfp_gen.buildings.page import PAGE
 
         return PAGE

@@ -180,11 +180,11 @@ class CompiledRun(AnyRun, Protocol):
 
 @dataclass(eq=False)
 class BuildingRun:
-    """A run of a building, as of `simulation.system.Run`: one segment, in which bearings change their models.
+    """A run of a building, as in `simulation.system.Run`: one segment, in which bearings change their models.
 
-    run: compiled. members: the bearings, which only the run steps. grounds: the different motions of the ground, that
-    of the scene first. build: hash of all that determines the numbers beside the scene. changes: of the models of
-    bearings, in order.
+    run: compiled. members: the bearings, which only the run steps. grounds: the different motions of the ground, the
+    scene's first. build: hash of all that determines the numbers beside the scene. changes: of the models of bearings,
+    in order.
     """
 
     run: CompiledRun
@@ -347,7 +347,7 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
 
 
 def unpacked(run: BuildingRun) -> dict[str, Array]:
-    """The rows until now by name, those of bearings with their index; each of shape (k, ...) [SI]."""
+    """The rows until now by name, of bearings with their index; each of shape (k, ...) [SI]."""
     basis = run.scene.building.oscillators.basis
     shapes = [("time", ()), *((name, (len(basis.T),)) for name in MOTIONS), ("ground", (len(run.grounds), 3, 3))]
     shapes += [(name, ()) for name in ENERGIES]

@@ -121,7 +121,7 @@ class BuildingScene(Printed, OtherSystem):
     building: the superstructure. bearings: at least one, of any layouts. motion: of the ground, from rest, in
     translation; displacements count from the start. solver: for the common steps of building and bearings. duration:
     of the run [s]; None: of the motion. output_step: time between rows, at which steps end [s]; None: 10 ms. limits: of
-    the bearings, for the verdict of the run; None: as of `Limits()`. fidelity: level of the model, for the notes.
+    the bearings, for the verdict of the run; None: `Limits()`. fidelity: level of the model, for the notes.
     Raises InputError: inconsistent parts, or weights that the bearings do not balance.
     """
 
@@ -153,7 +153,7 @@ class BuildingScene(Printed, OtherSystem):
         for index, mount in enumerate(self.bearings):
             if mount.bearing.gravity != self.gravity:
                 raise InputError(
-                    f"scene.bearings[{index}].bearing.gravity = {mount.bearing.gravity}: that of the first is "
+                    f"scene.bearings[{index}].bearing.gravity = {mount.bearing.gravity}; the first has "
                     f"{self.gravity}; give all the same [m/s^2]"
                 )
         self._check_places()
@@ -191,7 +191,7 @@ class BuildingScene(Printed, OtherSystem):
 
     @property
     def gravity(self) -> float:
-        """Acceleration of gravity, as of all bearings [m/s^2]."""
+        """Acceleration of gravity, the same for all bearings [m/s^2]."""
         return self.bearings[0].bearing.gravity
 
     @property
@@ -221,7 +221,7 @@ class BuildingScene(Printed, OtherSystem):
 
     @cached_property
     def attachments(self) -> Array:
-        """Rows, as of a node, of the upper ends of the bearings, shape (bearings, 6, n) [SI]."""
+        """Rows of the upper ends of the bearings, each as `Node.rows`, shape (bearings, 6, n) [SI]."""
         nodes = [self._node(index) for index in range(len(self.bearings))]
         return np.stack(
             [
@@ -308,7 +308,7 @@ class BuildingScene(Printed, OtherSystem):
 
     @property
     def own_motions(self) -> tuple[str, ...]:
-        """Paths of the motions that bearings have beside that of the ground."""
+        """Paths of the motions that bearings have beside the motion of the ground."""
         own = (index for index, mount in enumerate(self.bearings) if mount.motion is not None)
         return tuple(f"building.bearing[{index}].motion" for index in own)
 
@@ -320,38 +320,38 @@ class BuildingScene(Printed, OtherSystem):
         return tuple(dict.fromkeys(models))
 
     def start(self, **options: Any) -> Any:
-        """The run before its first step, as of `simulation.system.start`."""
+        """The run before its first step; see `simulation.system.start`."""
         from msfp_gen.buildings.run import start_run
 
         return start_run(self, **options)
 
     def text(self) -> str:
-        """The scene as text, as of `scene.file.loader.scene_text`."""
+        """The scene as text; see `scene.file.loader.scene_text`."""
         from msfp_gen.buildings.dataset import scene_text
 
         return scene_text(self) + f"[motion]\nname = {self.motion.name!r}\nduration = {self.motion.duration}\n"
 
     def explain(self) -> list[Table]:
-        """Tables that describe the scene, as of `scene.explain.explain`."""
+        """Tables that describe the scene; see `scene.explain.explain`."""
         from msfp_gen.buildings.explain import explain
 
         return explain(self)
 
     @property
     def figures(self) -> Mapping[str, Any]:
-        """The figures of a run by their names, as of `figures.figures_of`."""
+        """The figures of a run by their names; see `figures.figures_of`."""
         from msfp_gen.buildings.figures import FIGURES
 
         return FIGURES
 
     def structure(self, given: Mapping[str, Any]) -> Any:
-        """What a report shows of the superstructure, as of `report.analysis.structure_of`."""
+        """What a report shows of the superstructure; see `report.analysis.structure_of`."""
         from msfp_gen.buildings.modes import structure
 
         return structure(self, given.get("building", {}))
 
     def quantities(self) -> dict[str, Source]:
-        """What tables report of a run, as of `results.quantities.quantities`."""
+        """What tables report of a run; see `results.quantities.quantities`."""
         from msfp_gen.buildings.quantities import quantities
 
         return quantities(self)
@@ -369,13 +369,13 @@ class BuildingScene(Printed, OtherSystem):
         return f"BuildingScene {self.name or 'without a name'}", list(parts.items())
 
     def refusals(self) -> list[str]:
-        """Why values can hardly be meant, as of `scene.plausibility.refusals`."""
+        """Why values can hardly be meant; see `scene.plausibility.refusals`."""
         from msfp_gen.buildings.notes import refusals
 
         return refusals(self)
 
     def columns(self) -> Places:
-        """The columns of a table of all rows, as of `results.dataset.columns`."""
+        """The columns of a table of all rows; see `results.dataset.columns`."""
         from msfp_gen.buildings.dataset import columns
 
         return columns(self)
@@ -434,7 +434,7 @@ class BuildingScene(Printed, OtherSystem):
         return self if bearings == list(self.bearings) else replace(self, bearings=bearings)
 
     def at_fidelity(self, word: str) -> Any:
-        """The scene at a level of fidelity, as of `scene.fidelity.at_fidelity`."""
+        """The scene at a level of fidelity; see `scene.fidelity.at_fidelity`."""
         from msfp_gen.buildings.fidelity import at_fidelity
 
         return at_fidelity(self, word)
@@ -493,7 +493,7 @@ class BuildingScene(Printed, OtherSystem):
 
 
 def _selected(scene: BuildingScene, index: int, remaining: float) -> EffectSelection:
-    """The effects of a bearing by its index, with reasons. remaining: as of `remaining_loads`. Raises InputError."""
+    """The effects of a bearing by its index, with reasons. remaining: see `remaining_loads`. Raises InputError."""
     mount = scene.bearings[index]
     requested = Auto() if mount.effects is None else mount.effects
     if isinstance(requested, Effects):
@@ -508,7 +508,7 @@ def _selected(scene: BuildingScene, index: int, remaining: float) -> EffectSelec
 
 
 def _reasons(bearing: Bearing, requested: Auto, remaining: float) -> tuple[Reason, ...]:
-    """The choice and reason of every effect. remaining: as of `remaining_loads`; -inf: not known."""
+    """The choice and reason of every effect. remaining: see `remaining_loads`; -inf: not known."""
     capacity = min(surface.capacity for surface in bearing.surfaces)
     friction = select_friction(bearing, requested.friction_law)
     lifts = remaining <= LEAST_SHARE and requested.sliders != "massless"

@@ -62,7 +62,7 @@ def _short(values: Array) -> list[float]:
 
 
 def floor_spectra(result: Any, periods: ArrayLike | None, damping: float) -> FloorSpectra:
-    """The spectra of a `BuildingResult`; arguments and errors as of `BuildingResult.floor_spectra`."""
+    """The spectra of a `BuildingResult`; arguments and errors as in `BuildingResult.floor_spectra`."""
     given = PERIODS if periods is None else np.asarray(periods, dtype=float)
     if given.ndim != 1 or not given.size or not np.all((given > 0) & np.isfinite(given)):
         raise InputError(f"periods = {given.tolist()!r:.60}: give a list of positive numbers [s]")

@@ -40,13 +40,13 @@ class Node:
     floor: bool = False
 
     def linked(self, position: ArrayLike) -> Array:
-        """Rows, as of a node, of a point that a rigid link connects to the node, shape (6, n) [SI]. position: [m]."""
+        """Rows of a point that a rigid link connects to the node, shape (6, n) [SI]. position: of the point [m]."""
         moved: Array = rigid(np.asarray(position, dtype=float) - self.position) @ self.rows
         return moved
 
 
 def rigid(arm: ArrayLike) -> Array:
-    """The matrix from the six motions of a point A of a rigid body to those of a point B: ndarray, shape (6, 6), [SI].
+    """The matrix from the six motions of a point A of a rigid body to B's: ndarray, shape (6, 6), [SI].
 
     For small rotations. arm: from A to B, shape (3,) [m].
     """
@@ -181,7 +181,7 @@ def _floors(storeys: Sequence[Storey]) -> tuple[Node, ...]:
 
 
 def _columns(nodes: Sequence[Node], inertias: Sequence[Array], index: int, storey: Storey) -> StoreyColumns:
-    """The columns of a storey by its index, from 1. inertias: of all floors, as of `_inertia`."""
+    """The columns of a storey by its index, from 1. inertias: of all floors; see `_inertia`."""
     below, floor = nodes[index - 1], nodes[index]
     point = np.array([*storey.stiffness_centre, (below.position[2] + floor.position[2]) / 2])
     inertia = np.zeros_like(floor.rows)

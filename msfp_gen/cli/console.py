@@ -288,7 +288,7 @@ def with_field(scene: Any, name: str, change: Callable[[Any], Any]) -> Any:
 def run_scene(scene: Any, force: bool = False, **options: Any) -> tuple[Any, RunError | None]:
     """Run a scene; its result (of a failed run as far as it was computed), and the error of a failed run.
 
-    force: as of `plausibility.require_meant`.
+    force: see `plausibility.require_meant`.
     """
     from msfp_gen.scene.plausibility import require_meant
     from msfp_gen.simulation.memory import require_memory
@@ -307,7 +307,7 @@ def run_scene(scene: Any, force: bool = False, **options: Any) -> tuple[Any, Run
 def result_of(loaded: AnyResult | System, force: bool = False) -> tuple[Any, RunError | None]:
     """A loaded result, or the run of a loaded scene, and the error of a failed run.
 
-    force: as of `run_scene`. Raises RunError if nothing was computed.
+    force: see `run_scene`. Raises RunError if nothing was computed.
     """
     if is_result(loaded):
         return loaded, None
@@ -328,7 +328,7 @@ REPEAT = 0.05  # time after which an interrupt that was lost is repeated [s]
 def signals_as_interrupts() -> Iterator[list[int]]:
     """Within the block these signals raise KeyboardInterrupt; the list contains the numbers received.
 
-    Python ignores a KeyboardInterrupt in a callback, such as that of a weak reference; it is repeated.
+    Python ignores a KeyboardInterrupt in a callback, such as one of a weak reference; it is repeated.
     """
     received: list[int] = []
 

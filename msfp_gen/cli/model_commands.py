@@ -223,7 +223,7 @@ def export(
         typer.Argument(
             metavar="RUN | N M P",
             help="A result (.nc), or a scene file or preset, which is run first. With --prefix: layouts, three numbers "
-            "each, as of generate.",
+            "each, as for generate.",
         ),
     ],
     output: Annotated[

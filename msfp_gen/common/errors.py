@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 class MsfpError(Exception):
-    """Base class of all errors of this package; `exit_code` is that of the command line.
+    """Base class of all errors of this package; the command line ends with its `exit_code`.
 
     The message is converted to one line of printable text, since it may quote a file.
     """

@@ -73,7 +73,7 @@ def is_input(path: Path) -> bool:
 
 
 def digest_of(path: Path) -> str:
-    """The sha256 of a file, which counts as read: the expected one if there is. Errors are those of `read_input`."""
+    """The sha256 of a file, which counts as read: the expected one if there is. Errors as in `read_input`."""
     digest = (_expected.get() or {}).get(str(path.absolute()))
     if digest is None:
         return sha256(read_input(path)).hexdigest()

@@ -60,7 +60,7 @@ def replacing(path: Path, *, tidy: bool = True) -> Iterator[Path]:
 def write_bytes(path: Path, parts: Iterable[bytes | memoryview], *, tidy: bool = True) -> None:
     """Write a file completely or not at all: the bytes are flushed to disk before the file is renamed to `path`.
 
-    tidy: as of `replacing`. Raises OSError if the disk is full or the folder is not writable.
+    tidy: see `replacing`. Raises OSError if the disk is full or the folder is not writable.
     """
     with replacing(path, tidy=tidy) as temporary, temporary.open("wb") as file:
         file.writelines(parts)
@@ -88,7 +88,7 @@ def clear_leftovers(path: Path, age: float = OLD) -> None:
 
 
 def clear_all_leftovers(folder: Path, suffix: str) -> None:
-    """Delete the temporary files, as of `clear_leftovers`, of all files in `folder` that end in `suffix`."""
+    """Delete the temporary files, as in `clear_leftovers`, of all files in `folder` that end in `suffix`."""
     _clear(folder, "*", suffix, OLD)
 
 

@@ -150,7 +150,7 @@ def parquet_bytes(
 ) -> bytes:
     """The content of a Parquet file, with checksums of its pages.
 
-    columns: as of `write_columns`. types: name -> type in the words of Arrow; None: from the values. about: metadata of
+    columns: see `write_columns`. types: name -> type in the words of Arrow; None: from the values. about: metadata of
     the file. meanings: name -> text, as metadata "long_name" of the column.
     """
     import pyarrow as pa

@@ -54,14 +54,14 @@ def published_backbone(bearing: Bearing) -> Backbone:
 
 
 def _one(link: Link, share: float, friction: float) -> Link:
-    """The link of a rigid slider between two dishes, the first of which reaches its rim at the limit of `link`."""
+    """The link of a rigid slider between two dishes; the first reaches its rim at the limit of `link`."""
     return Link(None, link.surface, link.radius, share, share, friction, link.limit, link.yielding, link.rim)
 
 
 def effective(backbone: Backbone, displacement: float, gravity: float) -> Effective:
     """Effective properties at a displacement [m].
 
-    The loop is that of links in series, each of friction and a pendulum: one that tilts to theta dissipates
+    The loop belongs to links in series, each of friction and a pendulum: one that tilts to theta dissipates
     4 mu W share theta in a cycle. Raises InputError for a displacement beyond the last rim.
     """
     if not 0 < displacement <= backbone.capacity * (1 + 1e-9):

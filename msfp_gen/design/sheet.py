@@ -121,4 +121,4 @@ class SheetReport:
                 own = (case, f"{friction:.4f}", f"{radius * 1e3:.4g}") if not index else ("", "", "")
                 rows.append((*own, *cells))
         columns = ("friction", "Q/W", "R_eff [mm]", "D [mm]", "F [kN]", "k_eff [kN/mm]", "T_eff [s]", "damping [%]")
-        return Table("effective properties; Q and R_eff are those of the longest sliding regime", columns, rows)
+        return Table("effective properties; Q and R_eff belong to the longest sliding regime", columns, rows)

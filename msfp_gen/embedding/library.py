@@ -62,7 +62,7 @@ def export_library(
     """Build the models of `specs` and write the C library with all that its users need below `prefix`.
 
     progress: called with a text and the completed share, 0 to 1. target: the platform, a key of
-    `msfp_gen.jit.library.TARGETS`; None: that of this machine. Raises InputError: two models of one layout, an
+    `msfp_gen.jit.library.TARGETS`; None: this machine. Raises InputError: two models of one layout, an
     unknown target, a prefix that is no folder or holds files of the user under these names; CompileError. Nothing is
     written after an error.
     """
@@ -71,7 +71,7 @@ def export_library(
     if len(models) < len(specs):
         raise InputError(
             f"layouts = {', '.join(spec.layout.name.replace('_', ' ') for spec in specs)}: give each layout once; "
-            "its names in C are those of the layout"
+            "the layout gives its names in C"
         )
     check_prefix(root)
     folder = Path(tempfile.mkdtemp(prefix="msfp-gen-export-"))

@@ -1,5 +1,5 @@
 """A server of bearings for `element genericClient` of OpenSees (docs/other-programs.md): the protocol, a bearing that
-answers it, and the connections, each of which is a bearing of its own.
+answers it, and the connections; each connection is a bearing of its own.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Sizes:
         count, size = int(numbers[0]), int(numbers[10])
         expected = [count, count, count, 0, 1, 0, 0, 0, count, 0, size]
         if list(numbers) != expected or not 0 < 3 * count + 2 <= size <= LARGEST_MESSAGE or count**2 > size:
-            raise InputError(f"sizes {numbers.tolist()}: not those of an element genericClient of OpenSees")
+            raise InputError(f"sizes {numbers.tolist()}: an element genericClient of OpenSees sends others")
         return cls(size, count)
 
 

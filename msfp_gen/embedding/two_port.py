@@ -1,4 +1,4 @@
-"""`TwoPort`: a bearing both ends of which move as another program says (docs/embedding.md)."""
+"""`TwoPort`: a bearing whose ends both move as another program says (docs/embedding.md)."""
 
 from __future__ import annotations
 
@@ -126,8 +126,8 @@ class TwoPort:
         `Effects` of the model, spatial with locked spin; `top_rotation` is added. None: the default ones, with the
         friction law whose parameters the surfaces have.
     solver
-        Tolerances and steps; a method of implicit kind. `first_step` is that after the start, `max_steps` the limit of
-        one trial.
+        Tolerances and steps; a method of implicit kind. `first_step` is the first one after the start, `max_steps` the
+        limit of one trial.
 
     Raises
     ------
@@ -163,11 +163,12 @@ class TwoPort:
 
     @classmethod
     def of_scene(cls, scene: Scene) -> Self:
-        """The two-port of a scene with a rig: its springs and dampers, with their far ends moving, and its axial load.
+        """The two-port of a scene with a rig: it keeps the springs, dampers and axial load; the far ends of the springs
+        move.
 
-        The motion and the duration of the scene are not used. `Auto` effects are those of a motion that nobody knows:
-        spatial, inertial sliders, with rims. Raises InputError as the class, and where the top is no rig with
-        horizontal, vertical and rotational stiffness, or the scene has parts that a two-port has not.
+        The motion and the duration of the scene are not used. `Auto` effects suit a motion that nobody knows: spatial,
+        inertial sliders, with rims. Raises InputError as the class, and where the top is no rig with horizontal,
+        vertical and rotational stiffness, or the scene has parts that a two-port has not.
         """
         require_type(scene, Scene, "scene")
         return cls(scene.bearing, *parts_of_rig(scene), scene.solver)
@@ -183,10 +184,10 @@ class TwoPort:
         return self._port
 
     def trial(self, time: float, lower: ArrayLike, upper: ArrayLike) -> Response:
-        """Integrate from the committed state to `time`, and state the wrenches there.
+        """Integrate from the committed state to `time`, and return the wrenches there.
 
-        time [s]: later than the committed time, or that time with the committed motion of the ends. lower, upper:
-        motion of the ends at that time, each of shape (3, 6): displacements along E1, E2, E3 since the start [m] and
+        time [s]: later than the committed time, or the same time with the committed motion of the ends. lower, upper:
+        motion of the ends at `time`, each of shape (3, 6): displacements along E1, E2, E3 since the start [m] and
         rotation vector [rad]; their rates; their accelerations. Between the two times each of the six numbers (of the
         rotation: the angles psi, theta, phi (2.1)) follows the polynomial of degree five through both ends. Raises
         InputError; RunError where the bearing cannot follow: its committed state remains.
@@ -243,7 +244,7 @@ class TwoPort:
         self.revert()
 
     def unpacked(self, row: Array) -> dict[str, Array]:
-        """The values of a row by their names, shapes and units as of `Model.unpack`, for `Response`."""
+        """The values of a row by their names, shapes and units as in `Model.unpack`, for `Response`."""
         return self.model.unpack(row)
 
     def derivative(self, number: int, word: str, direction: tuple[float, float, float]) -> Array:
@@ -264,7 +265,7 @@ class TwoPort:
         start = self.time
         if time == start and not np.array_equal(ends, self._ends):
             raise InputError(
-                f"time = {time:.12g}: it is that of the committed state, whose ends are elsewhere; give a later one [s]"
+                f"time = {time:.12g}: the committed state has this time, with its ends elsewhere; give a later one [s]"
             )
         if time != start and time - start < SHORTEST * max(1.0, abs(start)):
             raise InputError(f"time = {time:.12g}: the committed state is at {start:.12g}; give a later time [s]")
@@ -296,7 +297,7 @@ def parts_of_rig(scene: Scene) -> tuple[NodeTop, float, Effects]:
     check_parts(scene)
     top = scene.top
     if not isinstance(top, RigTop):
-        raise InputError(f"top.kind = {top.kind!r}: the interface of a two-port is that of a rig; give kind = 'rig'")
+        raise InputError(f"top.kind = {top.kind!r}: a two-port needs the interface of a rig; give kind = 'rig'")
     if not top.vertical_stiffness:
         stiffness = BEARING_STIFFNESS * top.axial_load
         damping = 2 * USUAL_RATIO * np.sqrt(stiffness * top.axial_load / scene.bearing.gravity)
@@ -340,7 +341,7 @@ def scene_at_rest(
 
 
 def compiled_port(scene: Scene, model: Model, axial_load: float, **monitors: Any) -> Port:
-    """The compiled two-port of such a scene; monitors: as of `monitor_options`, for steps by stages."""
+    """The compiled two-port of such a scene; monitors: see `monitor_options`, for steps by stages."""
     count = scene.bearing.layout.surfaces
     q = np.zeros((count, 3))
     if model.effects.uplift:

@@ -74,7 +74,7 @@ ROWS = 4000  # rows of a run made for figures: the steps of the solver may be to
 
 @singledispatch
 def figures_of(loaded: Any) -> Mapping[str, Callable[[Any, str | Path | None], Figure]]:
-    """The figures of a system or a result, by their names on the command line."""
+    """Functions that draw the figures of a system or a result, by their names on the command line."""
     figures: Mapping[str, Callable[[Any, str | Path | None], Figure]] = loaded.figures
     return figures
 

@@ -74,8 +74,8 @@ def animate(
         frames_per_second: frame rate [1/s].
         start: first instant of the run that is shown [s]; None: its start.
         end: last instant of the run that is shown [s]; None: its end.
-        azimuth: of the plane of the section [rad]; None: that of the largest displacement. Of a building: of the first
-            elevation, the other one is perpendicular to it; None: along E1.
+        azimuth: of the plane of the section [rad]; None: the azimuth of the largest displacement. Of a building: of the
+            first elevation, the other one is perpendicular to it; None: along E1.
         progress: called with the number of finished frames and of all frames.
 
     Returns:
@@ -115,7 +115,7 @@ def check_movie(path: str | Path, name: str = "movie") -> Path:
 
 @singledispatch
 def film_of(result: Any, times: Array, azimuth: float | None) -> Film:
-    """The movie of a run at these times [s]; azimuth: as of `animate`."""
+    """The movie of a run at these times [s]; azimuth: see `animate`."""
     film: Film = result.film(times, azimuth)
     return film
 

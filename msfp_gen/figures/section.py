@@ -137,7 +137,7 @@ class SectionDrawing:
         return [*self.faces[::-1], self.line]
 
     def update(self, section: Section, row: int) -> None:
-        """Move everything to one row; `section` is that of the row."""
+        """Move everything to one row; `section` is the section at this row."""
         history, apart = self.history, self.apart[row]
         for artist, polygon in zip(self.bodies, section.bodies, strict=True):
             artist.set_xy(polygon * MILLI)

@@ -92,7 +92,7 @@ def page(width: float, height: float, path: str | Path | None = None, name: str 
 
 
 def distinct(count: int) -> list[str]:
-    """So many different colours: those of the palette, and of more a rainbow of even lightness."""
+    """So many different colours: from the palette, or where it has too few, from a rainbow of even lightness."""
     if count <= len(COLOURS):
         return list(COLOURS[:count])
     from matplotlib import colormaps

@@ -87,7 +87,7 @@ def prepare(spec: ModelSpec, progress: BuildProgress | None = None, portable: bo
     Args:
         spec: layout and effects.
         progress: called with a text and the completed share of the build, 0 to 1.
-        portable: compile for every processor, not only for that of this machine.
+        portable: compile for every processor, not only for the one of this machine.
 
     Raises:
         CompileError: no C compiler was found, or it rejected a file.
@@ -104,7 +104,7 @@ def prepare(spec: ModelSpec, progress: BuildProgress | None = None, portable: bo
 
 
 def load(spec: ModelSpec, progress: BuildProgress | None = None) -> tuple[ModuleType, BuildInfo]:
-    """Import the compiled module of a model, after building it if necessary; arguments and errors as of `prepare`."""
+    """Import the compiled module of a model, after building it if necessary; arguments and errors as in `prepare`."""
     begin = perf_counter()
     info = prepare(spec, progress)
     extension = load_extension(info.path, info.module)
@@ -240,7 +240,7 @@ def kept_wrapper(files: Mapping[str, str], inputs: Mapping[str, Any]) -> Path:
 
 
 def _included(name: str, files: Mapping[str, str]) -> set[str]:
-    """The name of a file, and those of the others that it includes."""
+    """The name of a file, and the names of the others that it includes."""
     names = {name}
     for header in _INCLUDE.findall(files[name]):
         if header in files:
@@ -370,7 +370,7 @@ def _driver(package: str) -> tuple[ModuleType, str]:
 
 
 def build_driver(package: str) -> cache.Entry:
-    """The module of a package in the cache, built unless it is there; errors as of `load_driver`."""
+    """The module of a package in the cache, built unless it is there; errors as in `load_driver`."""
     module, files = _named(package)
     entry = cache.Entry.of_files(module, files)
     entry.find_or_build(lambda part: _build_driver(entry, files, part))

@@ -80,7 +80,7 @@ class Manifest:
 
         Raises:
             OSError: the file cannot be read.
-            ValueError, TypeError: the content is not that of a manifest, or was changed.
+            ValueError, TypeError: the content is no manifest, or was changed.
         """
         content = (folder / MANIFEST_NAME).read_bytes()
         try:
@@ -140,7 +140,7 @@ class Entry:
 
         Args:
             spec: layout and effects.
-            portable: compiled for every processor, not only for that of this machine.
+            portable: compiled for every processor, not only for the one of this machine.
         """
         return cls._of(module_name(spec), {"spec": spec.key, "sources": digest_sources()}, portable)
 
@@ -188,7 +188,7 @@ class Entry:
     ) -> tuple[Manifest, bool]:
         """The manifest of the entry, and whether it was built now.
 
-        build: writes a complete entry into an empty folder. progress: as of `building`.
+        build: writes a complete entry into an empty folder. progress: see `building`.
         """
         if (manifest := self.find()) is not None:
             return manifest, False

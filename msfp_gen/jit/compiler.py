@@ -64,8 +64,8 @@ PLATFORM_COMPILERS = ("cc", "gcc", "clang")
 # it is told not to.
 ZIG_OPTIONS = ("cc", "-mcpu=baseline", "-fno-sanitize=undefined")
 
-# Warnings appear in the log only: a newer compiler of a user may warn where those of the tests (-Werror) do not.
-# MSFP_GEN_CFLAGS adds flags for the C code of models, such as -march=native.
+# Warnings appear in the log only: a newer compiler of a user may warn where the compilers of the tests (-Werror) do
+# not. MSFP_GEN_CFLAGS adds flags for the C code of models, such as -march=native.
 FLAGS: dict[str, tuple[str, ...]] = {
     "c": (
         "-std=c99",
@@ -187,7 +187,7 @@ def compile_extension(
     processor
         Flags of the C files that select a processor; see `msfp_gen.jit.compiler`.
     libraries
-        Options of the linker beside those of every extension.
+        Options of the linker beside the ones that every extension has.
     kept
         Where the object of the wrapper is kept for other extensions with the same one. It is used where the file is as
         it was written, and written otherwise.

@@ -197,7 +197,7 @@ TARGETS = {
 
 
 def find_platform(target: str | None) -> Platform:
-    """The platform that `target` names; None: that of this machine. Raises InputError for an unknown name."""
+    """The platform that `target` names; None: this machine. Raises InputError for an unknown name."""
     if target is None:
         return _macos() if sys.platform == "darwin" else _linux()
     if target not in TARGETS:
@@ -217,7 +217,7 @@ def find_tools(platform: Platform) -> tuple[Compiler, tuple[str, ...]]:
 
 
 def _find_archiver() -> tuple[str, ...]:
-    """The archiver that `AR` names, else `ar`, else that of ziglang. Raises CompileError where there is none."""
+    """The archiver that `AR` names, else `ar`, else the one of ziglang. Raises CompileError where there is none."""
     named = words("AR")
     command = named or ("ar",)
     if shutil.which(command[0]) is not None:

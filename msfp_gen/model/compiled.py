@@ -41,7 +41,7 @@ class Stack(Protocol):
     ) -> tuple[str, Array, Array, Array, float, int, int, Array | None]:
         """Status, accelerations, row, friction rates, residual, iterations, sign of the determinant, unknowns, (u,).
 
-        All [SI]; the friction rates are those of Y and Z [1/s].
+        All [SI]; the friction rates are the rates of Y and Z [1/s].
         """
 
     def many_accelerations(
@@ -80,13 +80,14 @@ class Stack(Protocol):
         unknowns: Array,
         variables: Sequence[tuple[int, int, int]] = (),
     ) -> tuple[Array, Array, Array]:
-        """Residual of the balances (3.26)-(3.29), (u,), its Jacobian, (u, k), and that of the friction rates, (2 b, k).
+        """Residual of the balances (3.26)-(3.29), (u,), its Jacobian, (u, k), and the Jacobian of the friction rates,
+        (2 b, k).
 
         k: number of variables, u where none is given. All [SI].
         """
 
     def vectors(self, q: Array, v: Array, a: Array, base: Array) -> tuple[Array, Array, Array]:
-        """Named points, rotations and bases (3.1)-(3.12), in shapes as of `named_vectors`."""
+        """Named points, rotations and bases (3.1)-(3.12), in shapes as in `named_vectors`."""
 
 
 class AnyRun(Protocol):
@@ -184,7 +185,7 @@ class Port(Protocol):
         """Go from the committed state to `time`, with the ends at `ends`, shape (2, 3, 6); returns `status`."""
 
     def derivative(self, direction: Array) -> tuple[str, Array]:
-        """Status, and derivatives of the wrenches, shape (12, 12); direction: as of `Response`."""
+        """Status, and derivatives of the wrenches, shape (12, 12); direction: see `Response`."""
 
     def commit(self) -> None:
         """Accept the last trial. Raises ValueError."""
@@ -333,7 +334,7 @@ def top_values(top: Top | None, anchor: ArrayLike = (0.0, 0.0)) -> Array:
 def separations_at_rest(bearing: Bearing, top: Top | None, added_load: float = 0.0) -> Array:
     """Separations at which the unilateral contacts carry all weights and loads, ndarray, shape (n-1, 3) [m].
 
-    added_load: vertical load in addition to that of the top, downward positive [N].
+    added_load: vertical load in addition to the load of the top, downward positive [N].
     """
     load = added_load + (0.0 if top is None else -float(load_values(top)[2]))
     mass = top.mass if isinstance(top, MassTop) else 0.0
@@ -361,11 +362,12 @@ FAILURES = {status.name: status.evaluation for status in STATUSES if status.eval
 class Evaluation:
     """One evaluation of the equations of motion.
 
-    acceleration: ndarray, shape (n-1, 3), second derivatives of psi, theta, phi [rad/s^2], with uplift (n-1, 6), those
-    of the separation [m/s^2] last; None in a massless model, which does not determine accelerations. unknowns: as
-    `Model.residual` takes them; None likewise. normal_force (n-1,) [N]; contact_angles (n-1, 2) psi~, theta~
-    [rad]; friction_rate (n-1, 2) dY/dt, dZ/dt [1/s]; interface_force (n-1, 3) P on the body above [N]; slip_velocity
-    (n-1, 2) u~, v~ [m/s]; friction_coefficient (n-1,), None where it is constant; sliding, gap (n-1,) [m].
+    acceleration: ndarray, shape (n-1, 3), second derivatives of psi, theta, phi [rad/s^2], with uplift (n-1, 6), the
+    accelerations of the separation [m/s^2] last; None in a massless model, which does not determine accelerations.
+    unknowns: as `Model.residual` takes them; None likewise. normal_force (n-1,) [N]; contact_angles (n-1, 2) psi~,
+    theta~ [rad]; friction_rate (n-1, 2) dY/dt, dZ/dt [1/s]; interface_force (n-1, 3) P on the body above [N];
+    slip_velocity (n-1, 2) u~, v~ [m/s]; friction_coefficient (n-1,), None where it is constant; sliding, gap (n-1,)
+    [m].
     residual_norm: largest residual of a balance over its scale [-]; massless: largest moment over the largest normal
     force, a measure of the distance from equilibrium [m]. determinant: sign of the determinant of the equations.
     """

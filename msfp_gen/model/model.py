@@ -150,7 +150,7 @@ ZERO: Triple = (0.0, 0.0, 0.0)
 
 
 def stack_values(spec: ModelSpec, bearing: Bearing, top: Top | None, anchor: ArrayLike) -> tuple[Any, ...]:
-    """The arguments of a compiled stack, gravity and arrays; arguments and errors as of `Model.stack`."""
+    """The arguments of a compiled stack, gravity and arrays; arguments and errors as in `Model.stack`."""
     effects = spec.effects
     if bearing.layout != spec.layout:
         raise InputError(f"bearing.layout = {bearing.layout.name}: this model is for {spec.layout.name}")
@@ -252,7 +252,7 @@ class Model:
     ) -> dict[str, Array]:
         """Accelerations of many states at once, at the cost of the C code.
 
-        q, v, h: as of `evaluate`, with a leading axis, (k, ...). base: displacements with rotations, rates and
+        q, v, h: see `evaluate`, with a leading axis, (k, ...). base: displacements with rotations, rates and
         accelerations, shape (3, 6) or (k, 3, 6) [SI]; load: force and moment on the top plate at r_nn, (6,) or (k, 6)
         [N], [N m]; None: zero. top: springs and mass above, None: none. Returns "acceleration" of the shape of q
         [rad/s^2] (separations [m/s^2]), "friction_rate" (k, n-1, 2) [1/s], and the row of every state as by `unpack`.
@@ -328,7 +328,7 @@ class Model:
         )
 
     def unknowns(self, a: Array, row: Array) -> Array:
-        """The unknowns as of `residual` [SI], from accelerations and a row, of a planar model in its plane."""
+        """The unknowns, as in `residual` [SI], from accelerations and a row, of a planar model in its plane."""
         fields = self.unpack(row)
         angles = fields["angles"][:, 1:] if self.planar else fields["angles"]
         return np.concatenate([a[:, free_coordinates(self.effects)].ravel(), angles.ravel(), fields["normal"]])
@@ -356,10 +356,10 @@ class Model:
         psi~, theta~ surface by surface [rad], N [N]. Returns ndarray, shape (6(n-1),): for each body the linear balance
         along E1, E2, E3 [N], then the angular one along t_1, t_2, t_3 of the body [N m]; with locked spin, phi'' takes
         the place of the axial component. A planar model has 3(n-1) unknowns (theta'', theta~, N) and balances (E1, E3,
-        t_2). With uplift there are 9(n-1), in the plane 5(n-1): the accelerations of a body go on with those of the
-        separation [m/s^2], and after the balances come, surface by surface, the components of the force (3.15)-(3.17)
-        less that of the unilateral contact [N]. `Evaluation.unknowns` has this order. Other inputs and errors as in
-        `evaluate`.
+        t_2). With uplift there are 9(n-1), in the plane 5(n-1): after the accelerations of a body follow the
+        accelerations of the separation [m/s^2], and after the balances come, surface by surface, the components of the
+        force (3.15)-(3.17) less the force of the unilateral contact [N]. `Evaluation.unknowns` has this order. Other
+        inputs and errors as in `evaluate`.
         """
         state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
         values = vector(unknowns, "unknowns", (self.extension.UNKNOWNS,), "rad/s^2, rad, N")

@@ -61,7 +61,7 @@ class SymbolicModel:
     rotation
         Rows omega_k, omega'_k, alpha_k, alpha'_k of three columns.
     residual
-        Rows E1_k, E2_k, E3_k [N], t1_k, t2_k, t3_k [N m] of bodies 2..n: as of `Model.residual`.
+        Rows E1_k, E2_k, E3_k [N], t1_k, t2_k, t3_k [N m] of bodies 2..n: see `Model.residual`.
     friction_rates
         Rows dY_g, dZ_g.
 
@@ -112,7 +112,7 @@ class SymbolicModel:
         return np.array([found[self._values[symbol]] for symbol in self.parameters])
 
     def subs(self, bearing: Bearing, top: Top | None = None) -> SymbolicModel:
-        """The equations with the numbers of a bearing and a top; errors as of `values`."""
+        """The equations with the numbers of a bearing and a top; errors as in `values`."""
         numbers = dict(zip(self.parameters, self.values(bearing, top).tolist(), strict=True))
         changed: dict[str, Any] = {name: getattr(self, name).subs(numbers) for name in SECTIONS}
         return replace(self, parameters=(), **changed)

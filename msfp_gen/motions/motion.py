@@ -231,7 +231,7 @@ class Motion:
     def __add__(self, other: Motion) -> Motion:
         """Sum of two motions on their merged knots. Raises InputError unless both have the same duration (`held`).
 
-        Durations that differ by less than any step are the same; the sum has that of the first.
+        Durations that differ by less than any step are the same; the sum has the duration of the first.
         """
         if not isinstance(other, Motion):
             return NotImplemented
@@ -415,7 +415,7 @@ class Motion:
             correct: False uses the record without correction (`records.uncorrected`), if its agency has corrected it.
             corner: corner frequency of the high-pass filter [Hz].
             taper: duration of the smooth start and end [s].
-            name: a label; None: that of the record.
+            name: a label; None: the name of the record.
         """
         from msfp_gen.motions.records import prepared
 
@@ -426,7 +426,7 @@ class Motion:
     def from_csv(cls, path: str | PathLike[str], *, name: str = "") -> Motion:
         """Motion from a CSV table of displacements, velocities or accelerations: see `records.read_table`.
 
-        Metadata `notes` are those of the table.
+        Metadata `notes` are the notes of the table.
         """
         from msfp_gen.motions.records import read_table
 

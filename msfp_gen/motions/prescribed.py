@@ -156,7 +156,7 @@ class Prescribed:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Load(Prescribed):
-    """Force F1, F2, F3 [N] and moment M1, M2, M3 [N m] on the top plate at r_nn, in addition to those of the `Top`.
+    """Force F1, F2, F3 [N] and moment M1, M2, M3 [N m] on the top plate at r_nn, in addition to the load of the `Top`.
 
     They represent, for example, overturning, cranes, wind or a jack: F_top, M_top of (3.28), (3.29) as functions of
     time. Construct a load with `constant`, `from_arrays`, `harmonic` or `ramp`; loads can be added. A load may jump.

@@ -174,7 +174,7 @@ def matched(values: Array, times: Array) -> Array:
 def snapped(knots: Array, coefficients: Array, times: Array) -> tuple[Array, Array]:
     """Knots, shape (k+1,) [s], matched to `times`, and coefficients, (k, channels, 6).
 
-    Without the pieces of which both ends become equal.
+    Pieces whose ends become equal are left out.
     """
     moved = matched(knots, times)
     kept = np.diff(moved) > 0

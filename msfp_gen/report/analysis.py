@@ -1,6 +1,6 @@
 """The report of a whole analysis: the suite at bounds in a folder -> a page of numbered sections, tables and figures.
 
-All numbers are those of the rows that `msfp-gen bound --suite -o` wrote, and of the inputs named in its folder, but for
+All numbers come from the rows that `msfp-gen bound --suite -o` wrote, and from the inputs named in its folder, except
 the runs that `repeated` makes again.
 """
 
@@ -91,7 +91,7 @@ def write_analysis(
             of the ground, for their loops and their comparison.
         progress: called with the share of these runs that is done, and 1.
 
-    Raises InputError: as of `load_suite_bounds`, or a path that does not end in .html or cannot be written.
+    Raises InputError: see `load_suite_bounds`, or a path that does not end in .html or cannot be written.
     """
     return write_page(path, lambda: analysis_html(folder, title, leave_out, loops=loops, progress=progress))
 
@@ -104,7 +104,7 @@ def analysis_html(
     loops: bool = True,
     progress: Progress | None = None,
 ) -> str:
-    """The report of a suite at bounds as text; arguments and errors as of `write_analysis`."""
+    """The report of a suite at bounds as text; arguments and errors as in `write_analysis`."""
     from msfp_gen.studies.assessment.rows import read_study
     from msfp_gen.studies.run import Chunks
 

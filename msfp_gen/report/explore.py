@@ -162,12 +162,12 @@ EXPLORED = (
 )  # fmt: skip
 RECORD = 15.0  # of a record [s]: the strong part of the bundled one
 WORKER = ("explorer/solver.js", "explorer/worker.js")
-# The first two are those of the HTML report.
+# The first two stand in the HTML report too.
 SCRIPTS = ("dom.js", "chart.js", "explorer/numbers.js", "explorer/stack.js", "explorer/explorer.js")
 
 
 def write_explorer(path: str | Path, scene: Scene | None = None, progress: Progress | None = None) -> Path:
-    """Write the explorer to `path`; the file appears only when complete. Arguments and errors as of `explorer_html`.
+    """Write the explorer to `path`; the file appears only when complete. Arguments and errors as in `explorer_html`.
 
     Raises InputError for a path that does not end in .html or cannot be written.
     """

@@ -1,6 +1,6 @@
-"""The HTML pages: that of a run, with tables, figures, data and scripts in a template, and that of a fit.
+"""The HTML pages: of a run, with tables, figures, data and scripts in a template, and of a fit.
 
-All numbers of tables are those of the result; none depends on the machine.
+All numbers of tables come from the result; none depends on the machine.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def summary_page(result: AnyResult) -> list[Table]:
     """Tables of the run as in `msfp-gen run`, without times of the machine, and of the events of one bearing."""
     first, *others = result.tables()
     rows = [("time simulated", f"{result.summary['duration']:.6g} s"), *(row for row in first.rows if row[0] != "time")]
-    events = getattr(result, "events", ())  # a building has those of its bearings in the notes
+    events = getattr(result, "events", ())  # a building has the events of its bearings in the notes
     return [Table("the run", (), rows), *others, *([_event_table(events)] if events else [])]
 
 
@@ -162,7 +162,7 @@ class Page(NamedTuple):
 
     name: of what moves. introduction: the begin of one sentence about it. explanation: of its view. figures: name ->
     title. assets: folder of `stage` and `scripts`, which other scripts may lie beside in this package. stage: template
-    of the view. scripts: after those of every page. view: data for the scripts, of about so many instants.
+    of the view. scripts: after the scripts of every page. view: data for the scripts, of about so many instants.
     """
 
     name: str
@@ -398,7 +398,7 @@ def _tests(fit: Fit) -> Table:
 
 
 def _load(fit: Fit, test: FittedTest) -> str:
-    """Axial load of a test, or that of the scene [kN]."""
+    """Axial load of a test, or of the scene [kN]."""
     load = test.measured.axial_load
     return f"{(fit.scene.top.axial_load if load is None else load) * KILO:.5g}"  # type: ignore[attr-defined]
 

@@ -129,7 +129,7 @@ class Characterisation:
 
     FORCE: ClassVar[str] = "peak force"
     LOAD: ClassVar[str] = "the axial load"
-    OF: ClassVar[str] = ""  # of which the displacement is
+    OF: ClassVar[str] = ""  # whose displacement it is
 
     name: str
     status: str
@@ -386,7 +386,7 @@ def characterised(
 ) -> Characterisation:
     """Properties that follow from the path of a bearing, or of an isolation system.
 
-    name, status: of the run. peaks: largest horizontal displacement [m] and force [N] over all steps. load: that of the
+    name, status: of the run. peaks: largest horizontal displacement [m] and force [N] over all steps. load: of the
     period [N]; None: none. dissipated: energy since the start, shape (T,) [J]. demands: on the surfaces over some rows;
     None: over the run. branch: from one row to another; None: not known.
     """

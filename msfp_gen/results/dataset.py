@@ -121,7 +121,7 @@ def _columns(surfaces: int) -> Places:
 
 @singledispatch
 def columns(system: Any) -> Places:
-    """The columns of a table of all rows, as of `column_places`; a run has those of its effects."""
+    """The columns of a table of all rows, as in `column_places`; a run has the columns of its effects."""
     places: Places = system.columns()
     return places
 
@@ -143,7 +143,7 @@ def _attributes(result: Result) -> dict[str, str | int | float]:
 
 
 def _attributes_below(one: Result, mounting: Mounting) -> dict[str, str | int | float]:
-    """Those of a bearing of a building, for other programs: its file is not read again."""
+    """Attributes of a bearing of a building, for other programs: its file is not read again."""
     from msfp_gen.scene.file.loader import bearing_table, dumps, plain_table
 
     parts = {"bearing": bearing_table(mounting.bearing), "interface": plain_table(mounting.interface)}
@@ -193,7 +193,7 @@ def _gradients(root: StoredGroup, sizes: dict[str, int]) -> Gradients | None:
     def gradients(suffix: str = "", error: Gradients | None = None) -> Gradients:
         extremes = tuple(Extremes.of_table(table) for table in json.loads(str(attributes[f"extremes{suffix}"])))
         if len(extremes) != len(parameters) or not extremes:
-            raise ValueError("the derivatives of the extremes are not those of the parameters")
+            raise ValueError("the derivatives of the extremes are by other parameters")
         rows = [name for name in ROWS if name in quantity and name + suffix in group]
         variables = {f"{name}{suffix}": _derivative(VARIABLES[name]) for name in (*rows, *energies, *EVENTS)}
         read = stored_fields(group, variables, sizes)
@@ -244,7 +244,7 @@ def _extremes(table: dict[str, Any], surfaces: int) -> Extremes:
     """Extremes of all steps and their times; the numbers are finite."""
     extremes = Extremes.of_table(table)
     if extremes.times.keys() != extremes.arrays.keys():
-        raise ValueError("extremes: times are not those of the values")
+        raise ValueError("extremes: times and values have different names")
     for name, values in (*extremes.arrays.items(), *extremes.times.items()):
         shape = (4,) if name in ("displacement", "top_force") else (surfaces,)
         if values.shape != shape or not np.isfinite(values).all():
@@ -267,7 +267,7 @@ def to_gradient_dataset(result: Result) -> xr.Dataset:
     """Derivatives of the variables of the dataset of a run, under their names, with the first dimension `parameter`.
 
     Where the errors of the derivatives were measured, each has a variable `..._error` beside it.
-    Attributes of a variable: `units`, those of the quantity over `parameter_unit`, which differs between parameters;
+    Attributes of a variable: `units`, the unit of the quantity over `parameter_unit`, which differs between parameters;
     coordinate `parameter_unit`: unit of each parameter; `parameter_value`: its value in the scene.
     """
     gradients = gradients_of(result)

@@ -28,9 +28,9 @@ FINE = 2.0  # modes over the thickness in units of sqrt(D times the median step 
 def temperature_at_depth(result: Result, depth: float) -> Array:
     """Temperature at a depth below the centre of every surface in every row, shape (T, n-1) [degC].
 
-    depth: below the sliding surface, inside the heated plate [m]. It follows from the temperature of the surface in the
-    rows, which is taken as linear between them. Source: Carslaw and Jaeger, Conduction of Heat in Solids (1959). Raises
-    InputError where the run has no temperatures, or where a plate is thinner.
+    depth: below the sliding surface, inside the heated plate [m]. The result follows from the temperature of the
+    surface in the rows, which is taken as linear between them. Source: Carslaw and Jaeger, Conduction of Heat in Solids
+    (1959). Raises InputError where the run has no temperatures, or where a plate is thinner.
     """
     if not 0 <= depth < inf:
         raise InputError(f"depth = {depth}: a distance below the sliding surface [m]; give 0 or more")
@@ -56,7 +56,7 @@ def temperature_at_depth(result: Result, depth: float) -> Array:
 
 
 def rise_inside(time: Array, rise: Array, depth: float, diffusivity: float, thickness: float) -> Array:
-    """Rise of temperature at a depth [m] by that of the surface, linear between its times: time [s], rise [K], (T,)."""
+    """Rise of temperature at a depth [m], shape (T,) [K], from the surface's rise [K], linear between its times [s]."""
     steps = np.diff(time)
     across = min(thickness, depth + REACH * float(np.sqrt(diffusivity * (time[-1] - time[0]))))
     count = 10 + int(FINE * across / np.sqrt(diffusivity * np.median(steps)))

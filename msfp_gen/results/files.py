@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from msfp_gen.results.result import AnyResult
 
 COUNTER, PROVENANCE = "counter_", "provenance_"  # prefixes of the attributes with counters and provenance
-EDITION = "edition"  # attribute: of the names in a file; that of another version of msfp-gen differs if these do
+EDITION = "edition"  # attribute: of the names in a file; versions of msfp-gen with other names have another
 TURNED = {f"{event}{name}{error}" for name in SIGNED for event in ("", "event_") for error in ("", ERROR)}
 WORDS = ("scene", "motion", "status", "message", "notes")  # attributes that are texts
 # What h5py, json, tomllib and NumPy raise for content that they cannot read.
@@ -48,8 +48,8 @@ class Storage:
 
     Attributes:
         to_dataset: the dataset of a result.
-        arrays_of: the arrays of a result of which the variables of the dataset are parts, by field.
-        columns: of a scene, the columns of an exported table, each with its variable and its index in that.
+        arrays_of: the arrays of a result by field; the variables of the dataset are parts of them.
+        columns: of a scene, the columns of an exported table, each with a variable and its index in this variable.
         edition: a digest of the names that a file of this version has.
         fields_in: the fields of a result from an opened file and its attributes, except status, message and provenance.
             Raises InputError, or what `DAMAGE` lists.
@@ -93,7 +93,7 @@ def to_netcdf(result: AnyResult, path: str | Path) -> Path:
 def to_csv(result: AnyResult, path: str | Path, columns: Sequence[str] | None = None) -> Path:
     """Write a CSV file: one comment, `name [unit]` as header, one line per row; then the origin as # comments.
 
-    The origin is the attributes of the dataset, the events, and the scene as TOML text. columns: names as of
+    The origin is the attributes of the dataset, the events, and the scene as TOML text. columns: names as in
     `export_columns`. Raises InputError where the suffix is not .csv or the folder does not exist.
     """
     target = check_output(path, (".csv",))
@@ -111,9 +111,9 @@ def to_csv(result: AnyResult, path: str | Path, columns: Sequence[str] | None = 
 
 
 def to_parquet(result: AnyResult, path: str | Path, columns: Sequence[str] | None = None) -> Path:
-    """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file.
+    """Write a Parquet file: units and meanings as metadata of columns, the rest as metadata of the file.
 
-    columns: names as of `export_columns`. Raises InputError as `to_csv` does.
+    columns: names as in `export_columns`. Raises InputError as `to_csv` does.
     """
     target = check_output(path, (".parquet",))
     dataset = signed(result.dataset)
@@ -163,7 +163,7 @@ WRITERS: dict[str, Callable[..., Path]] = {
 def check_result_path(path: str | Path, name: str = "output") -> Path:
     """`path` if a result can be written there; raises InputError otherwise.
 
-    name: that of the option, for the message.
+    name: of the option, for the message.
     """
     return check_output(path, WRITERS, name)
 
@@ -189,7 +189,7 @@ class TableColumn(NamedTuple):
 
 
 def table_of(dataset: xr.Dataset) -> list[TableColumn]:
-    """Every variable along time as columns, as of `columns_of`.
+    """Every variable along time as columns; see `columns_of`.
 
     Surfaces that a bearing of a building does not have are left out.
     """

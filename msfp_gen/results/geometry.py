@@ -23,7 +23,7 @@ class Poses:
         basis: ndarray, shape (T, n, 3, 3), [-]: rows t_1, t_2, t_3 of every body, without its spin (2.1)-(2.6).
         spin: ndarray, shape (T, n), [rad]: phi of every body about its own t_3 (2.27).
         bottom, top: ndarray, shape (T, n, 3), [m]: centres of the lower and upper face of every body.
-        centre: ndarray, shape (T, n-1, 3), [m]: sphere centres r_gc; with uplift, those of the sliders.
+        centre: ndarray, shape (T, n-1, 3), [m]: sphere centres r_gc; with uplift, of the sliders.
         contact: ndarray, shape (T, n-1, 3), [m]: contact points (3.14).
         rim: ndarray, shape (T, n-1, 3), [m]: point of the slider nearest to the rim (3.25); on its axis where centred.
         force: ndarray, shape (T, n-1, 3), [N]: interface force on the body above; 0 while the surface is separated.
@@ -81,8 +81,9 @@ def body_bases(angles: Array) -> Array:
 def body_positions(bearing: Bearing, basis: Array, separation: Array) -> tuple[Array, Array, Array]:
     """Centres of the lower and upper faces, each shape (T, n, 3), and sphere centres, shape (T, n-1, 3) [m].
 
-    basis: ndarray, shape (T, n, 3, 3), from `body_bases`. separation: of the sphere centre of the body above from that
-    of the body below, ndarray, shape (T, n-1, 3) [m]; zero without uplift. The sphere centres are those of the sliders.
+    basis: ndarray, shape (T, n, 3, 3), from `body_bases`. separation: from the sphere centre of the body below to that
+    centre of the body above, ndarray, shape (T, n-1, 3) [m]; zero without uplift. The sphere centres belong to the
+    sliders.
     """
     lengths = bearing.arrays()
     axis = basis[:, :, 2]
@@ -187,7 +188,7 @@ def outline(bearing: Bearing, body: int) -> Array:
 
 
 def slider_face(bearing: Bearing, surface: int) -> Array:
-    """Half meridian of the face of the slider of a surface (index from 0), shape (k, 2) [m], as of `outline`."""
+    """Half meridian of the face of the slider of a surface (index from 0), shape (k, 2) [m], as in `outline`."""
     body = bearing.slider(surface)
     face = _face(bearing, surface, body)
     if bearing.layout.signs[surface] > 0:
@@ -203,7 +204,7 @@ def slider_radius(bearing: Bearing, surface: int) -> float:
 
 
 def dish_radius(bearing: Bearing, surface: int) -> float:
-    """Radius of the rim of a surface (index from 0) about the axis of its dish [m]: that of the slider at capacity."""
+    """Radius of the rim of a surface (index from 0) about the axis of its dish [m]: where the slider is at capacity."""
     data = bearing.surfaces[surface]
     return data.radius * sin(data.capacity / data.radius + asin(slider_radius(bearing, surface) / data.radius))
 

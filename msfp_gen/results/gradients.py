@@ -1,4 +1,4 @@
-"""`Gradients`: the derivatives of a run by parameters, and those of its extremes."""
+"""`Gradients`: the derivatives of a run and of its extremes by parameters."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EVENTS = ("event_time", "event_displacement", "event_top_force")  # fields
 def energy_terms(integrals: bool, uplift: bool) -> tuple[str, ...]:
     """The terms of the energy that are differentiated.
 
-    integrals: also those that are integrals over the run. uplift: also those of unilateral contacts.
+    integrals: also terms that are integrals over the run. uplift: also terms of unilateral contacts.
     """
     return tuple(
         name for name in ENERGY if (integrals or name in ENERGIES) and (uplift or not name.startswith("seat_"))
@@ -61,7 +61,7 @@ def gradients_of_extremes(gradients: Gradients, history: History, recorded: Extr
 
 
 def _slopes(name: str, gradients: Gradients, history: History) -> Array:
-    """Derivatives of the values of which an extreme is taken, `series`, shape (k, T, m) [SI]."""
+    """Derivatives of the values from which an extreme is taken, `series`, shape (k, T, m) [SI]."""
     field, kind = SERIES[name]
     values, slopes = getattr(history, field), gradients.arrays[field]
     if not kind:

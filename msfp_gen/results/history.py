@@ -54,7 +54,7 @@ EQUAL_PEAKS = 1e-3
 
 
 def first_peak(size: Array) -> int:
-    """Row of the largest of `size`, shape (T,); of peaks that differ by less than `EQUAL_PEAKS`, that of the first."""
+    """Row of the largest of `size`, shape (T,); of peaks that differ by less than `EQUAL_PEAKS`, the first."""
     near = size >= (1.0 - EQUAL_PEAKS) * size.max()
     first = int(near.argmax())
     last = len(size) if near[first:].all() else first + int((~near[first:]).argmax())
@@ -239,7 +239,8 @@ class Counters:
 
 
 LEAST = {extreme.name for extreme in contract.EXTREMES if extreme.least}  # of all others the largest counts
-# Extreme -> field of `History` of which it is taken, and whether it is a magnitude: along each axis, or of the vector.
+# Extreme -> field of `History` from which it is taken, and whether it is a magnitude: along each axis, or of the
+# vector.
 SERIES = {
     "displacement": ("displacement", "axes"),
     "top_force": ("top_force", "axes"),
@@ -257,7 +258,7 @@ SERIES = {
 
 
 def series(name: str, history: History) -> Array | None:
-    """The values of which an extreme is taken, shape (T, m) [SI]; None where the rows do not have them."""
+    """The values from which an extreme is taken, shape (T, m) [SI]; None where the rows do not have them."""
     field, kind = SERIES[name]
     values: Array | None = getattr(history, field)
     if values is None or not kind:

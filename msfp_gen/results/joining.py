@@ -24,8 +24,8 @@ class Joint:
     """How segments become one history.
 
     The first row of a later segment repeats the last row of the one before it and is left out. Where a run begins with
-    segments that took no step, the row of its start is that of the first model that went on: forces of massless sliders
-    at a start out of balance are not those of the run. Energies continue from their last values.
+    segments that took no step, the first model that went on gives the row of its start: forces of massless sliders at a
+    start out of balance are not forces of the run. Energies continue from their last values.
 
     ends: of each segment its first and its last row, each a history of one row. counts: number of rows of each segment.
     output_step: distance of rows [s]; rows at the end of a segment between them are left out; None: rows of every step.
@@ -43,7 +43,7 @@ class Joint:
         self._before = before
         self._first = [first for first, _ in ends]
         end = {name: values[0] for name, values in ends[0][1].energy.items()} if ends else {}
-        self._added = [end]  # energies at the end of the segment before; those of the first are not used
+        self._added = [end]  # energies at the end of the segment before; the first one's are not used
         for first, last in ends[1:]:  # a segment that took no step adds no value
             self._added.append(end)
             end = {name: value + last.energy[name][0] - first.energy[name][0] for name, value in end.items()}
@@ -126,7 +126,7 @@ def at_times(result: R, times: ArrayLike) -> R:
 
     times: ndarray, shape (K,), or a number [s]. Raises InputError for a time outside the run.
     """
-    rows: Any = getattr(result, "history", result)  # that of a building has its rows itself
+    rows: Any = getattr(result, "history", result)  # the result of a building has its rows itself
     new_times = checked_times(rows.time, times)
 
     def at(values: Any) -> Any:

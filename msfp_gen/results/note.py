@@ -135,7 +135,7 @@ def _text(kind: str, surface: int, value: float, status: str, went_on: bool, alo
 
 
 def joined_notes(earlier: Iterable[Note], later: Iterable[Note]) -> list[Note]:
-    """The notes of a run, with those of its next model.
+    """The notes of a run, with the notes of its next model.
 
     Of two of one kind that changed nothing the first stands for both, with the larger value of those in `RISING`.
     """
@@ -151,7 +151,7 @@ def joined_notes(earlier: Iterable[Note], later: Iterable[Note]) -> list[Note]:
 
 
 def _changes(kind: str, before: Effects, after: Effects | None) -> list[str]:
-    """The effects that changed after a monitor tripped; after a jam these can be those of inertia or of uplift."""
+    """The effects that changed after a monitor tripped; after a jam these can be inertia or uplift."""
     # The monitors of a friction law change none, whatever another monitor changes at the same time.
     names = REQUIRED_EFFECTS["uplift"] if kind == "jammed" else REQUIRED_EFFECTS.get(kind, {})
     return [

@@ -19,7 +19,7 @@ class Quantity(NamedTuple):
     whether the largest or the least value governs a design; "" if neither does. at_rest: whether the quantity is
     defined only if the run ends at rest. of_parts: whether it is of parts of a building, which suites compare and
     bounds do not. kept: whether a study keeps it where its file names no quantities. extreme: whether it is the largest
-    or the least value over the run; None: as `governs`. words: in tables and figures, in place of those of the column.
+    or the least value over the run; None: as `governs`. words: in tables and figures, in place of the column's.
     where: attribute of the characterisation that names the place of the value, and its share of what is allowed there.
     apart: whether it is no part of the summary, and made only where a study keeps it.
     """

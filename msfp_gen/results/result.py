@@ -228,7 +228,7 @@ class Mounting:
 
 
 class Alone(NamedTuple):
-    """What the run of one bearing alone has, and a bearing below a building has not."""
+    """What the run of one bearing alone has and a bearing below a building does not have."""
 
     scene: Scene
     history: History
@@ -267,7 +267,7 @@ class Result(AnyResult):
     options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
     recorded_extremes: of all accepted steps; None where only the rows are known. gradients: derivatives with respect to
     parameters; None: not computed. mounting: None for a bearing alone; below a building, whose scene is `scene`, what
-    that tells of the bearing.
+    its scene says about the bearing.
     """
 
     source: ClassVar[str] = "msfp-gen"
@@ -286,7 +286,7 @@ class Result(AnyResult):
 
     @property
     def bearings(self) -> tuple[Result]:
-        """The bearing itself."""
+        """The result itself, as the only bearing."""
         return (self,)
 
     @property
@@ -334,7 +334,7 @@ class Result(AnyResult):
 
     @property
     def one_pendulum(self) -> bool:
-        """Whether its surfaces are those of one pendulum in place of the stack (docs/studies.md)."""
+        """Whether its surfaces make one pendulum in place of the stack (docs/studies.md)."""
         return self.scene.fidelity == "equivalent"
 
     @property
@@ -344,7 +344,7 @@ class Result(AnyResult):
 
     @property
     def compared(self) -> dict[str, Array]:
-        """Horizontal force on the top support [N], and sliding of every surface [m]: as of `AnyResult.compared`."""
+        """Horizontal force on the top support [N], and sliding of every surface [m]: see `AnyResult.compared`."""
         return {"force": self.history.top_force[:, None, :2], "sliding": self.history.sliding[:, :, None]}
 
     @property
@@ -376,7 +376,7 @@ class Result(AnyResult):
 
     @property
     def friction_coefficient(self) -> Array:
-        """Friction coefficient mu of every surface, ndarray, shape (T, n-1), [-]: recorded, or that of the bearing.
+        """Friction coefficient mu of every surface, ndarray, shape (T, n-1), [-]: recorded, or from the bearing.
 
         Raises InputError below a building.
         """
@@ -492,7 +492,7 @@ def characterise(result: Any) -> Any:
 
 
 def load_result(path: str | Path) -> Any:
-    """The result in a file that `save` wrote as netCDF: a `Result`, or that of another system, such as of a building.
+    """The result in a file that `save` wrote as netCDF: a `Result`, a `BuildingResult` or the result of another system.
 
     Raises InputError of one line that names the file and the remedy for any other file.
     """

@@ -51,7 +51,7 @@ class StoredGroup:
         return StoredGroup(group, self._size, self._turned)
 
     def turning(self, names: Collection[str]) -> StoredGroup:
-        """The same group, of which arrays of these names are read with the other sign."""
+        """The same group; arrays of these names are read with the other sign."""
         return StoredGroup(self._group, self._size, names)
 
     def attributes(self, wanted: Callable[[str], bool]) -> dict[str, Attribute]:
@@ -111,7 +111,7 @@ class StoredGroup:
         chunk = math.prod(dataset.chunks or (0,)) * dataset.dtype.itemsize
         most = stored * (EXPANSION if h5z.FILTER_DEFLATE in filters else 1)
         if stored > self._size or size > most or chunk > max(size, SMALLEST_CHUNK):
-            raise ValueError(f"{name} claims {size} bytes, of which the file has {stored}")
+            raise ValueError(f"{name} claims {size} bytes, and the file has {stored} of them")
 
     def _attribute(self, name: str) -> Attribute:
         import h5py

@@ -31,7 +31,7 @@ SYMBOLS = {"u_star": "u*", "u_star_star": "u**"}  # keys that PEER 2017/07 write
 def is_monotonic(result: Result) -> bool:
     """Whether the run is a monotonic push: its motion is a ramp, or the displacement has no reversal.
 
-    Never that of a bearing below a building, whose first contacts of rims are not located.
+    Never for a bearing below a building, whose first contacts of rims are not located.
     """
     if result.number:
         return False
@@ -319,8 +319,8 @@ def summarise_gradients(result: Result) -> dict[str, dict[str, Any]]:
 
     Keys: peak_displacement, peak_force, peak_force_ratio, peak_sliding, minimum_gap, minimum_normal_force,
     maximum_normal_force, peak_rim_force and, with a friction law, least_friction, most_friction and peak_temperature,
-    as in the summary; and of runs with `energy_gradients` energy, those of the terms of `History.energy` at the end;
-    where errors were measured, error: that of each derivative, with the same keys. Raises InputError where the run
+    as in the summary; and of runs with `energy_gradients` energy, the derivatives of the terms of `History.energy` at
+    the end; where errors were measured, error: of each derivative, with the same keys. Raises InputError where the run
     computed no derivatives, and for a key whose value jumps (`WITHOUT`).
     """
     gradients = gradients_of(result)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Index = tuple[int | slice | EllipsisType, ...]
 Arrays = dict[str, Any]
 Labels = Mapping[str, Any]  # dimension -> labels of its entries, a sequence or an array
-SURFACES = ("bearing", "surface")  # dimensions of values of which a bearing with fewer surfaces has fewer
+SURFACES = ("bearing", "surface")  # dimensions of values; a bearing with fewer surfaces has fewer values
 MEANINGS = {  # of dimensions whose labels do not say it
     "body": "moving body k, base is 1",
     "surface": "sliding surface, bottom first",
@@ -68,7 +68,7 @@ Places = dict[str, tuple[Variable, Any]]  # column of a table -> its variable, a
 def dataset_of(
     variables: Variables, arrays: Mapping[str, Any], coordinates: Arrays, attributes: Mapping[str, Attribute]
 ) -> xr.Dataset:
-    """The dataset of these variables; those without an array are left out. coordinates: as of `labelled`."""
+    """The dataset of these variables; those without an array are left out. coordinates: see `labelled`."""
     import xarray as xr
 
     data = {name: (v.dims, v.of(arrays), v.about) for name, v in variables.items() if v.field in arrays}

@@ -202,7 +202,7 @@ def verdict_of(
     stopped: float | None = None,
     whole: bool = False,
 ) -> Verdict:
-    """The verdict of a run. limits: of the scene; None: the defaults. failure, stopped, whole: as of `Verdict`."""
+    """The verdict of a run. limits: of the scene; None: the defaults. failure, stopped, whole: see `Verdict`."""
     allowed = limits or Limits()
     readings = [
         Reading(limit, one.number, one.label, value)

@@ -121,8 +121,8 @@ class Bearing(Printed):
     base_centroid: z_1, which only defines the named point r_1 (3.2); None: half the height [m].
     friction_lower, friction_upper: coefficients of the surfaces at the bounds of a bounding analysis, bottom first;
     None: it needs factors.
-    friction_at: "pivot" where the coefficients of `surfaces`, and their bounds, are those of a data sheet; the bearing
-    keeps those at the surfaces (`friction_from_pivot`).
+    friction_at: "pivot" where the coefficients of `surfaces`, and their bounds, come from a data sheet; the bearing
+    keeps the coefficients at the surfaces (`friction_from_pivot`).
     Raises InputError: a wrong number of entries, a value out of range, or a geometry that cannot be built.
     """
 
@@ -248,7 +248,7 @@ class Bearing(Printed):
 
     @property
     def _base(self) -> tuple[float, ...]:
-        """The values of the base, as those of a body in `contract.BODY`; mass and moments of inertia 0."""
+        """The values of the base, as a body has them in `contract.BODY`; mass and moments of inertia 0."""
         centroid = self.base_height / 2 if self.base_centroid is None else self.base_centroid
         return (self.base_height, centroid, 0.0, 0.0, 0.0, self.base_rim_radius, self.base_rim_offset)
 
@@ -256,9 +256,9 @@ class Bearing(Printed):
         """A copy with some values changed: fields of the bearing, or one field of all its surfaces or bodies.
 
         A field of surfaces or bodies takes a list, bottom first (`friction=[0.064, 0.168, 0.168, 0.064]`), or one value
-        for all. With `friction_at="pivot"` the coefficients in `friction` are those of a data sheet, which refer to the
-        pivot of the bearing, and are converted: `friction_from_pivot`. Raises InputError: an unknown
-        name, a list of the wrong length, or an invalid value.
+        for all. With `friction_at="pivot"` the coefficients in `friction` come from a data sheet, which refers them to
+        the pivot of the bearing, and are converted: `friction_from_pivot`. Raises InputError: an unknown name, a list
+        of the wrong length, or an invalid value.
         """
         friction_at = changes.pop("friction_at", "surface")
         if _is_at_pivot(friction_at) and not {"friction", "surfaces"} & changes.keys():
@@ -294,7 +294,7 @@ class Bearing(Printed):
 
     @property
     def friction_at_pivot(self) -> tuple[float, ...] | None:
-        """Coefficients of a data sheet, of which `friction_from_pivot` makes those of the surfaces, bottom first [-].
+        """Coefficients of a data sheet, which `friction_from_pivot` converts to the surfaces, bottom first [-].
 
         None where the pivot is not the middle of a slider, or where a surface has the arm of the next one.
         """
@@ -359,7 +359,7 @@ def _expanded(column: str, value: Any, count: int) -> list[Any]:
 def friction_from_pivot(
     layout: Layout, radii: Sequence[float], heights: Sequence[float], coefficients: Sequence[float]
 ) -> list[float]:
-    """Friction coefficients mu of the surfaces [-], from those of a data sheet, which refer to the pivot.
+    """Friction coefficients mu of the surfaces [-], from the coefficients of a data sheet, which refer to the pivot.
 
     Published formulas let friction act at the pivot, the middle of the innermost slider, and not at the sliding
     surface. The coefficient of an outer surface in such a formula contains the lever arms of the inner ones:
@@ -387,8 +387,8 @@ def friction_from_pivot(
             moment = coefficients[index] * (arm - inner_arm) + inner_moment
             if moment < 0:
                 raise InputError(
-                    f"bearing.surfaces[{index}].friction = {coefficients[index]:g} at the pivot: that of the surface "
-                    "itself would be negative; give a larger one, or coefficients at the surfaces"
+                    f"bearing.surfaces[{index}].friction = {coefficients[index]:g} at the pivot: at "
+                    "the surface it would be negative; give a larger one, or coefficients at the surfaces"
                 )
             converted[index] = moment / radii[index]
             inner_arm, inner_moment = arm, moment

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 def response_time(bearing: Bearing, top: Top, load: float) -> float:
     """Longest time in which a body between two sliding surfaces follows a change of its velocity, sqrt(m/k) [s].
 
-    Surfaces share the motion differently while the bodies respond. Sliding friction has no stiffness: k is that of the
-    spheres, N/R of both surfaces, and of the rig above the top plate. load: N, the smallest of the run [N]; inf
-    without load.
+    Surfaces share the motion differently while the bodies respond. Sliding friction has no stiffness: k is the
+    stiffness of the spheres, N/R of both surfaces, and of the rig above the top plate. load: N, the smallest of the run
+    [N]; inf without load.
     """
     longest, radii = 0.0, [surface.radius for surface in bearing.surfaces]
     held = top.stiffness if isinstance(top, RigTop) else 0.0
@@ -38,7 +38,7 @@ def response_time(bearing: Bearing, top: Top, load: float) -> float:
 
 
 class Samples(NamedTuple):
-    """The base motion of a scene at its knots, those of the load, and 1001 even times until the end of the run.
+    """The base motion of a scene at its knots, at the load's, and at 1001 even times until the end of the run.
 
     times: shape (k,) [s]. displacement [m], acceleration [m/s^2]: shape (k, 3). peak_speed [m/s], peak_acceleration
     [m/s^2]: largest magnitudes.

@@ -86,8 +86,8 @@ def check(scene: Requested, effects: Effects) -> None:
 def stopping_monitors(scene: Requested, effects: Effects, strict: bool) -> tuple[str, ...]:
     """The monitors that stop a run with these effects; the others only write notes.
 
-    strict: all monitors, except that of uplift where the scene gives `Effects`. Otherwise those after which the run can
-    continue with a model that includes the effect.
+    strict: all monitors, except the one of uplift where the scene gives `Effects`. Otherwise the monitors after which
+    the run can continue with a model that includes the effect.
     """
     if strict:
         return MONITORS if isinstance(scene.effects, Auto) else tuple(name for name in MONITORS if name != "uplift")
@@ -115,7 +115,7 @@ def next_effects(scene: Requested, ending: Ending) -> Effects | None:
 def all_effects(scene: SceneFields) -> Effects:
     """The effects of a scene if nothing is left to monitors: every effect that one of them may add is modelled.
 
-    Those of which the scene fixes a field stay as they are, and so does a friction law without further parameters.
+    Effects with a field that the scene fixes stay as they are, and so does a friction law without further parameters.
     """
     requested = scene.effects
     if isinstance(requested, Effects):

@@ -112,7 +112,7 @@ def surface_table(bearing: Bearing) -> Table:
 
 
 def doubt_tables(doubts: Iterable[tuple[int, float, str]]) -> Iterator[Table]:
-    """A table of doubtful values, as of `plausibility.doubtful_values`; none without any."""
+    """A table of doubtful values, as in `plausibility.doubtful_values`; none without any."""
     rows = [(text,) for _, _, text in doubts]
     if rows:
         yield Table("values that are hardly meant", ("value",), rows)

@@ -43,7 +43,7 @@ class Link:
         surface: index of the surface, from 0.
         radius: radius of the surface [m].
         effective: effective radius, from the sphere centre to the pivot [m].
-        share: effective radius less that of the next link inwards [m].
+        share: effective radius less the effective radius of the next link inwards [m].
         friction: friction coefficient [-].
         limit: largest tilt relative to the next link outwards, at rim contact [rad].
         yielding: yield displacement [m].
@@ -106,7 +106,7 @@ def series_links(bearing: Bearing, rims: bool, arms: bool) -> list[Link]:
 class Backbone:
     """Force over axial load of a stack that is pushed from its centre, piecewise linear, with rigid rims.
 
-    links: as of `series_links`. yielding: displacement within which friction is elastic [m].
+    links: see `series_links`. yielding: displacement within which friction is elastic [m].
     """
 
     links: tuple[Link, ...]
@@ -200,10 +200,10 @@ def _reduced_scene(scene: Scene, word: str) -> Scene:
 
 
 def check_stack(scene: Any) -> None:
-    """Raise InputError where values of surfaces and bodies are those of a pendulum in place of the given stack."""
+    """Raise InputError where values of surfaces and bodies describe a pendulum in place of the given stack."""
     if scene.fidelity == "equivalent":
         raise InputError(
-            "fidelity = 'equivalent': its surfaces are those of one pendulum, not of the stack; give 'massless', or a "
+            "fidelity = 'equivalent': its surfaces make one pendulum, not the stack; give 'massless', or a "
             "study, which changes the stack first"
         )
 
@@ -301,7 +301,7 @@ def main_regime(backbone: Backbone) -> tuple[float, float, float]:
     """Friction coefficient, radius [m] and yield displacement [m] of the longest sliding regime of a backbone.
 
     The yield displacement gives a loop to its end the dissipation of the published loop, which begins with the regimes
-    before. The regime is that of the least slope, of equal ones the first.
+    before. The regime is the one of the least slope, of equal ones the first.
     """
     u, force = backbone.points
     slopes = np.diff(force) / np.diff(u)

@@ -99,7 +99,7 @@ def check_bearing(law: Law | None, word: str, spin: str, bearing: Bearing) -> No
     """Check the friction parameters of a bearing.
 
     Raises InputError where a surface lacks a parameter of the law or of the drilling moment, has one of another, or
-    where the law is not valid with its parameters. law: None for constant friction. word, spin: those of
+    where the law is not valid with its parameters. law: None for constant friction. word, spin: as in
     `Effects.friction` and `Effects.spin`.
     """
     laws, names = {**BUILT_IN, word: law}, law_parameter_names()

@@ -252,7 +252,7 @@ def _history_parameter(scene: Scene, part: str, field: str) -> Parameter:
 
 
 def changed_parameters(scene: Scene, values: Mapping[Parameter, float]) -> Scene:
-    """`scene` with other values of parameters, which must be those of `parameters_of(scene, ...)`.
+    """`scene` with other values of parameters, which `parameters_of(scene, ...)` must have given.
 
     Raises InputError where a field does not accept its value.
     """

@@ -1,7 +1,7 @@
 """Values that are hardly meant: a table of checks, each with its usual range, and the notes on a scene that follow.
 
-A value beyond its usual range gives a note with field, value and remedy; one beyond the wider range, as of a unit that
-is off by a thousand, is refused by the command line unless it is told to run (`refusals`).
+A value beyond its usual range gives a note with field, value and remedy; one beyond the wider range, such as by a unit
+that is off by a thousand, is refused by the command line unless it is told to run (`refusals`).
 """
 
 from __future__ import annotations
@@ -174,7 +174,7 @@ def _scale(subject: Subject) -> Iterator[Reading]:
 
 
 def _rig(subject: Subject) -> Iterator[Reading]:
-    """Stiffness of the spring of a rig over that of the largest sphere under the load."""
+    """Stiffness of the spring of a rig over the stiffness of the largest sphere under the load."""
     if isinstance(subject.top, RigTop) and subject.top.stiffness > 0 and subject.load > 0:
         own = subject.load / max(surface.radius for surface in subject.bearing.surfaces)
         yield Reading(0, subject.top.stiffness, subject.top.stiffness / own, {"own": own})
@@ -234,7 +234,7 @@ OF_BEARING = (
     Check(
         _order,
         (-inf, 1.0),
-        _S + ".radius = {value:g} m is larger than that of the surface outside, surfaces[{outer}].radius = {outside:g} "
+        _S + ".radius = {value:g} m exceeds the radius of the surface outside, surfaces[{outer}].radius = {outside:g} "
         "m; surfaces go from the bottom: are outer and inner ones, or m and p of the layout, exchanged?",
     ),
     Check(

@@ -40,12 +40,12 @@ WIDER: dict[str, tuple[str, Any]] = {
 class Scene(Printed, SceneFields):
     """The complete input of `simulate`.
 
-    bearing, motion (of the base), top, solver: see their classes. duration [s]; None: that of the motion.
+    bearing, motion (of the base), top, solver: see their classes. duration [s]; None: the duration of the motion.
     initial_state; None: centred and at rest. output_step: distance of rows [s]; None: the steps of the solver.
-    stop: condition that ends the run early. load: load history on the top plate, in addition to that of the top.
+    stop: condition that ends the run early. load: load history on the top plate, in addition to the load of the top.
     top_rotation: rotation history of the support to which the rotational springs of the top are fixed. effects: the
     effects that are modelled, or `Auto`: selected from the scene. limits: of the device, for the verdict of the
-    run; None: those of `Limits()`. fidelity: the level at which `at_fidelity` made it, for its notes. motion_table:
+    run; None: `Limits()`. fidelity: the level at which `at_fidelity` made it, for its notes. motion_table:
     the `[motion]` table of a scene file, from which the scene can be written back. Raises InputError: a part of the
     wrong type, or inconsistent parts.
     """

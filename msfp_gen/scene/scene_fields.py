@@ -29,7 +29,7 @@ _FORCE, _LENGTH, _TIME = Quantity("N", above=0.0), Quantity("m", above=0.0), Qua
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of the device, of each bearing of a building. No number of a run depends on them, only its verdict.
+    """Limits of a bearing, in a building of each bearing. No number of a run depends on them, only its verdict.
 
     rim_force: of a rim [N]; None: a third of the axial load at rest, of the largest normal force where the load varies.
     rim_compression: of a rim [m]; None: a tenth of the capacity of its surface. uplift_height: clearance between the

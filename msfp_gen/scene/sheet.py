@@ -34,7 +34,7 @@ class Sheet:
 
     Attributes:
         device: "single", "double", "triple" or "quintuple". The slider of a single turns in a joint below the top
-            plate, of which nothing need be known; the slider of a double is one rigid piece.
+            plate, about which nothing need be known; the slider of a double is one rigid piece.
         radius: R of each surface [m].
         effective_radius: R_eff, from the centre of the sphere to the pivot [m].
         height: h = R - R_eff of each surface, from it to the pivot [m]. Two of the three are given.
@@ -46,7 +46,7 @@ class Sheet:
         yield_displacement: of each surface before it slides [m].
         axial_load: at rest [N].
         plate_height: of the base and of the top plate at their axes [m]; only masses and the drawing depend on it.
-        density: of the bodies, of which masses and moments of inertia follow [kg/m^3].
+        density: of the bodies; masses and moments of inertia follow from it [kg/m^3].
 
     Raises InputError.
     """

@@ -1,12 +1,12 @@
-"""Springs of the top: whether they hold the plate up, and how much of their compliance is that of the contacts.
+"""Springs of the top: whether they hold the plate up, and how much of their compliance the contacts have.
 
 The plate stands by its rotational stiffness against load times lever. While all surfaces slide, friction is a force and
 no stiffness. To small tilts the stack is then a chain of links between the sphere centres of its surfaces: body k turns
-about that of its lower face and carries the load at that of its upper face, or at r_nn. Its potential energy is that of
-the load on links that lean, and of the springs of the top.
+about the centre of its lower face and carries the load at the centre of its upper face, or at r_nn. Its potential
+energy is the energy of the load on links that lean, and of the springs of the top.
 
-The stiffness of a top is that of everything between the lowest surface and what holds the top plate. In models with
-uplift the contacts have a part of this compliance and the spring has the rest, so that a bearing that stays closed
+The stiffness of a top is the stiffness of everything between the lowest surface and what holds the top plate. In models
+with uplift the contacts have a part of this compliance and the spring has the rest, so that a bearing that stays closed
 moves as without uplift (docs/uplift.md).
 """
 
@@ -64,7 +64,7 @@ def needed_rotational_stiffness(
 def check_standing(path: str, stiffness: float, needed: float, load: float) -> None:
     """Raise InputError where a rotational stiffness that is given does not hold the plate up.
 
-    path: of the field in messages. stiffness: its value, 0: none is given. needed: as of `needed_rotational_stiffness`.
+    path: of the field in messages. stiffness: its value, 0: none is given. needed: see `needed_rotational_stiffness`.
     load: on the plate [N].
     """
     if 0 < stiffness <= needed < np.inf:
@@ -77,7 +77,7 @@ def check_standing(path: str, stiffness: float, needed: float, load: float) -> N
 def unsteady(path: str, stiffness: float, needed: float) -> Iterator[tuple[int, float, str]]:
     """The doubt about a plate that only friction holds up, or that would turn over under `MARGIN` times its load.
 
-    Yields 0 (no surface), the value and the text, as `doubtful_values`. Arguments as of `check_standing`.
+    Yields 0 (no surface), the value and the text, as `doubtful_values`. Arguments as in `check_standing`.
     """
     if 0 < needed < np.inf and stiffness < MARGIN * needed:
         reason = f"the top plate turns over where N is {stiffness / needed:.2g} times that at rest"

@@ -122,36 +122,36 @@ class OtherSystem(ABC):
         raise InputError(f"{self.name}: this system cannot be written as a scene file; leave the file out")
 
     def structure(self, given: Mapping[str, Any]) -> Any:
-        """Tables and figures of the superstructure, as of `report.analysis.structure_of`. given: the scene's table."""
+        """Tables and figures of the superstructure; see `report.analysis.structure_of`. given: the scene's table."""
         return [], []
 
     @abstractmethod
     def start(self, **options: Any) -> Any:
-        """The run before its first step, as of `simulation.system.Run`. Raises InputError, RunError."""
+        """The run before its first step; see `simulation.system.Run`. Raises InputError, RunError."""
 
     def explain(self) -> list[Any]:
-        """Tables that describe it, as of `scene.explain.explain`."""
+        """Tables that describe it; see `scene.explain.explain`."""
         return []
 
     def refusals(self) -> list[str]:
-        """Why values can hardly be meant, as of `scene.plausibility.refusals`."""
+        """Why values can hardly be meant; see `scene.plausibility.refusals`."""
         return []
 
     def quantities(self) -> dict[str, Any]:
-        """What tables report of a run, as of `results.quantities.quantities`."""
+        """What tables report of a run; see `results.quantities.quantities`."""
         return {}
 
     def columns(self) -> dict[str, Any]:
-        """The columns of a table of all rows, as of `results.dataset.columns`."""
+        """The columns of a table of all rows; see `results.dataset.columns`."""
         return {}
 
     @property
     def figures(self) -> Mapping[str, Any]:
-        """The figures of a run by their names, as of `figures.figures_of`."""
+        """The figures of a run by their names; see `figures.figures_of`."""
         return {}
 
     def at_fidelity(self, word: str) -> Any:
-        """It at a level of fidelity, as of `scene.fidelity.at_fidelity`."""
+        """It at a level of fidelity; see `scene.fidelity.at_fidelity`."""
         raise InputError(f"fidelity = {word!r}: this system has no such model; leave it out")
 
     def with_bearings(self, change: Callable[[Bearing, Law | None], Bearing]) -> Any:
@@ -195,7 +195,7 @@ class Kind:
 
     Attributes:
         key: the table of a scene file by which the kind is known, such as "building".
-        from_table: makes the system of the table of a file; arguments and errors as of `scene_from_table`.
+        from_table: makes the system of the table of a file; arguments and errors as in `scene_from_table`.
         files: place, table and keys of every table of a file that may name files.
         common: tables inside the table `key` that its rows have unless they have their own.
         presets: folder of TOML files with systems of this kind; None: there are none.

@@ -116,7 +116,7 @@ class MassTop(Top):
 
     mass [kg]. inertia: (transverse, axial) about its centre of mass, or one value for both [kg m^2].
     height: of its centre of mass above the top of the top plate, r_nn [m].
-    rotational_stiffness, rotational_damping: restraint against tilt, such as that of the remaining structure
+    rotational_stiffness, rotational_damping: restraint against tilt, such as by the remaining structure
     [N m/rad], [N m s/rad]. vertical_stiffness, vertical_damping: between top plate and mass, of bearing and columns, k
     and c of docs/model.md [N/m], [N s/m]; None or 0: rigid. At the start the spring carries the weight at rest. Raises
     InputError.
@@ -134,7 +134,7 @@ class MassTop(Top):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.vertical_stiffness == 0.0:  # no spring, as of a rig
+        if self.vertical_stiffness == 0.0:  # no spring, as a rig may have none
             object.__setattr__(self, "vertical_stiffness", None)
         if self.vertical_damping and self.vertical_stiffness is None:
             raise InputError(

@@ -56,7 +56,7 @@ def start_bearing(
     energy_gradients: bool = False,
     gradient_errors: bool = True,
 ) -> BearingRun:
-    """The run of a bearing before its first segment; options, errors: as of `simulate`."""
+    """The run of a bearing before its first segment; options, errors: see `simulate`."""
     parameters = gradient_parameters(scene, gradients, energy_gradients)
     require_memory([scene] * (1 + len(parameters)))
     options = {"strict": strict, "gradients": gradients, "energy_gradients": energy_gradients}
@@ -66,11 +66,11 @@ def start_bearing(
 
 @dataclass(eq=False)
 class BearingRun:
-    """A run of a bearing, as of `simulation.system.Run`.
+    """A run of a bearing; see `simulation.system.Run`.
 
-    scene: that of the user. settled: the same with the initial state after settling. strict: as of `simulate`. effects:
+    scene: the user's. settled: the same with the initial state after settling. strict: see `simulate`. effects:
     of the next segment. segments: that have ended. notes: of these. parameters: of the derivatives; energies: whether
-    these include energies that are integrals over the run. slopes: the derivatives of the state after settling, as of
+    these include energies that are integrals over the run. slopes: the derivatives of the state after settling, from
     `start_slopes`; None: the run starts as the scene says. repeated: options of the run that measures the errors of
     derivatives; empty: they are not measured.
     """
@@ -193,7 +193,7 @@ def _finished(scene: Scene, **options: Any) -> Result:
 def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, tuple[Array, Array] | None]:
     """A scene whose plates are tilted at the start, with the initial state after a slow tilting; others unchanged.
 
-    Returns the derivatives of that state too, as of `start_slopes`; None: the run starts as the scene says. Raises
+    Returns the derivatives of this state too, as in `start_slopes`; None: the run starts as the scene says. Raises
     RunError where the tilting fails.
     """
     if not needs_settling(scene):

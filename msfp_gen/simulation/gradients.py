@@ -61,7 +61,7 @@ def start_gradients(
     """Begin the derivatives of a run that has taken no step.
 
     steps: ends of all steps [s], in place of the step control, for differences with the same steps. energies: also of
-    the energies that are integrals over the run. start: derivatives of the initial state, as of `start_slopes`; None:
+    the energies that are integrals over the run. start: derivatives of the initial state, as in `start_slopes`; None:
     it is constant. Raises InputError where a parameter leads out of the plane of a planar model.
     """
     inputs = [
@@ -402,10 +402,11 @@ def gradient_notes(scene: Scene, effects: Effects, events: Sequence[Event]) -> t
 
 
 def measured_errors(result: Result, finer: Result) -> Gradients:
-    """Errors of the derivatives of `result`, positive: `ERROR_FACTOR` times their differences from those of `finer`.
+    """Errors of the derivatives of `result`, positive: `ERROR_FACTOR` times their differences from the derivatives of
+    `finer`.
 
-    That of a row is the largest from there to the next event, because errors oscillate. Of an event that `finer` has
-    not, and between two instants of the same event, the error is as large as the derivative itself.
+    The error of a row is the largest from there to the next event, because errors oscillate. Of an event that `finer`
+    has not, and between two instants of the same event, the error is as large as the derivative itself.
     """
     ours, theirs = result.gradients, finer.gradients
     assert ours is not None

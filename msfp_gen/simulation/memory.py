@@ -28,7 +28,7 @@ _PROC, _CGROUP = Path("/proc"), Path("/sys/fs/cgroup")
 def require_memory(systems: Sequence[System]) -> None:
     """Raise InputError where the rows of all runs, which are kept until the end, do not fit into memory.
 
-    Rows of one bearing alone are counted; those of other systems are few. Scenes without `output_step` count with their
+    Rows of one bearing alone are counted; other systems have few rows. Scenes without `output_step` count with their
     longest step, which gives the least number of rows; without that they are not counted, since their steps are not
     known before.
     """

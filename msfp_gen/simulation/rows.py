@@ -129,7 +129,7 @@ class Segment:
 def start_temperatures(law: Law | None, scene: Scene) -> dict[str, Array]:
     """The temperature of every surface at the start as "temperature", shape (n-1,) [degC]; nothing without one.
 
-    It is that of the rows of earlier models without heat, and of the friction law in them. law: of the last model.
+    Rows of earlier models without heat have it, and the friction law in them. law: of the last model.
     """
     if law is None or not law.depends_on_temperature:
         return {}

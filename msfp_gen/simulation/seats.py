@@ -1,7 +1,8 @@
 """Separations with which a run with uplift starts: those whose contacts hold the bodies together.
 
-As without uplift, the sphere centres of a surface move as one at the start. The contact forces are then those of that
-model, whatever the tilts, the loads and the accelerations at the start, unless a slider stands on its edge.
+As without uplift, the sphere centres of a surface move as one at the start. The contact forces are then the forces of
+the model without uplift, whatever the tilts, the loads and the accelerations at the start, unless a slider stands on
+its edge.
 """
 
 from __future__ import annotations

@@ -52,15 +52,15 @@ def simulate(  # noqa: D417 - the docstring lists the options one by one
     checkpoint: str | Path | None = None,
     every: float = EVERY,
     resume: bool = False,
-    **options: Any,  # those of `scene.run_options`, which the docstring lists
+    **options: Any,  # the options of `scene.run_options`, which the docstring lists
 ) -> Any:
-    """Integrate a scene.
+    """Run a scene: integrate its equations from the start to the end of the motion.
 
     Parameters
     ----------
     scene
-        Of a bearing (`Scene`), of a building (`BuildingScene`), or another system. The options from `strict` to
-        `gradient_errors` are those of a bearing, `threads` is that of a building.
+        The scene of a bearing (`Scene`), of a building (`BuildingScene`), or another system. The options from `strict`
+        to `gradient_errors` are for a bearing, `threads` is for a building.
     progress
         Called repeatedly with the time reached and the end of the run [s]. An exception in it ends the run.
     checkpoint
@@ -69,7 +69,7 @@ def simulate(  # noqa: D417 - the docstring lists the options one by one
     every
         Wall time between two checkpoints [s].
     resume
-        Continue from the state in `checkpoint`; the rows are bit by bit those of an uninterrupted run.
+        Continue from the state in `checkpoint`; the rows are bit by bit the same as without the interruption.
     strict
         Stop where a monitor trips (status `monitor`), instead of continuing with a model that includes the effect
         (`Auto`) or with a note in the result (`Effects`): docs/effects.md.
@@ -123,7 +123,7 @@ def integrate(
 ) -> Any:
     """The result of a run, also of one that failed after its first row.
 
-    Arguments, errors: as of `simulate`. with_initial_row: as of `Run.result`. Raises RunError where there is no row.
+    Arguments, errors: see `simulate`. with_initial_row: see `Run.result`. Raises RunError where there is no row.
     """
     run = start(system, **options)
     if checkpoint is not None and run.without_checkpoint:
@@ -144,6 +144,6 @@ start.register(Scene, start_bearing)
 
 
 def check_method(system: System) -> None:
-    """Raise InputError where the method does not run the effects; those of other systems are checked at their start."""
+    """Raise InputError where the method does not run the effects; other systems check theirs at their start."""
     if isinstance(system, Scene):
         check(system, system.modelled)

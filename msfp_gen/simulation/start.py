@@ -1,7 +1,7 @@
 """The start of a segment, computed by one model: state, frame and monitors of the compiled run.
 
 The first begins with the initial state of the scene, another with the `RestartState` of the one before it. Where plates
-are tilted at the start, the initial state is that of a bearing in level position that is tilted slowly.
+are tilted at the start, the initial state is reached by a bearing in level position that is tilted slowly.
 """
 
 from __future__ import annotations
@@ -88,14 +88,14 @@ class RestartState:
     def memory_of(self, law: Law | None) -> Array | None:
         """Parts of what the surfaces remember for a law, shape (n-1, parts) [SI]; None where it needs none.
 
-        A law of temperature takes those of the monitor of heat where the earlier model had no temperatures.
+        A law of temperature takes the temperatures of the monitor of heat where the earlier model had no temperatures.
         """
         if law is None or law.memory is None:
             return None
         return self.monitor_heat if self.memory is None and law.depends_on_temperature else self.memory
 
     def contact_force(self, bearing: Bearing) -> Array:
-        """Interface forces without those of the rims, shape (n-1, 3) [N]."""
+        """Interface forces without the forces of the rims, shape (n-1, 3) [N]."""
         angles = np.vstack([self.base_angles, self.q[:, :3]])
         force: Array = self.force - rim_forces(bearing, angles[None], self.rim_force[None])[0]
         return force
@@ -107,7 +107,7 @@ def transferred_state(bearing: Bearing, top: Top, model: Model, at: RestartState
     Shapes (n-1, 3), (n-1, 3), or 6 in place of 3 with separations, and (n-1, 2) [rad], [m], [rad/s], [m/s].
 
     Angles, rates and friction states describe the same stack. Where the earlier model had no separations, they follow
-    from the interface forces without those of the rims: the unilateral contacts are compressed by them.
+    from the interface forces without the forces of the rims: the unilateral contacts are compressed by them.
     """
     q, v, f, force = at.q, at.v, at.f, at.contact_force(bearing)
     separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
@@ -141,7 +141,7 @@ def transferred_heights(
 
     Separations that the earlier model did not have lower the top plate at rest and change the length of a spring below
     a mass, whose compliance they take over: the next model goes on as if it had been there from the start. added_load:
-    that at the start, as of `separations_at_rest`.
+    at the start; see `separations_at_rest`.
     """
     if at.q.shape[1] > 3 or not model.effects.uplift:
         return at.origin, at.foot
@@ -178,7 +178,7 @@ class Frame:
 
 
 class RunArguments(NamedTuple):
-    """Arguments of a compiled run: those of its stack, its arrays by position, and by name."""
+    """Arguments of a compiled run: of its stack, its arrays by position, and by name."""
 
     stack: tuple[Any, ...]
     arrays: tuple[Any, ...]
@@ -223,7 +223,7 @@ def first_arguments(scene: Scene, spec: ModelSpec) -> tuple[RunArguments, float]
 def run_arguments(
     scene: Scene, spec: ModelSpec, frame: Frame, state: tuple[Array, Array, Array], end: float
 ) -> RunArguments:
-    """The arguments of a compiled run from a state, without monitors. end: as of `start_run`."""
+    """The arguments of a compiled run from a state, without monitors. end: see `start_run`."""
     solver, stop, grid = scene.solver, scene.stop, time_grid(scene)
     arrays = (
         *kept(frame.motion, _snapped, grid),
@@ -256,7 +256,7 @@ def run_arguments(
 def wrench_pieces(scene: Scene) -> tuple[Array, Array]:
     """Knots, shape (k+1,) [s], and polynomials, (k, 6, 6), of force and moment on the top plate [N], [N m].
 
-    Those of the top and of the load history.
+    They are the loads of the top and of the load history.
     """
     knots, pieces = np.array([0.0, max(scene.end, 1.0)]), np.zeros((1, 6, ORDER))
     if scene.load is not None:
@@ -334,7 +334,7 @@ def given_state(scene: Scene, model: Model | ModelSpec, frame: Frame) -> tuple[A
 
 
 def first_load(scene: Scene) -> float:
-    """Load at the start beside that of the top, downward positive [N]."""
+    """Load at the start beside the load of the top, downward positive [N]."""
     return 0.0 if scene.load is None else -float(scene.load.evaluate(0.0)[2])
 
 

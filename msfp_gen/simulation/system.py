@@ -54,7 +54,7 @@ class Run(Protocol):
 
 
 def finish(run: Run, end: float, progress: Progress | None = None, checkpoint: Checkpoint | None = None) -> None:
-    """Take a run to its end [s], or until it fails or is interrupted. progress, checkpoint: as of `simulate`."""
+    """Take a run to its end [s], or until it fails or is interrupted. progress, checkpoint: see `simulate`."""
     while True:
         run.begin()
         if checkpoint is not None:

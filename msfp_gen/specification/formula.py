@@ -208,7 +208,7 @@ class _UnitSolver:
         return a
 
     def require_dimensionless(self, a: Unit, place: str) -> Unit:
-        """Impose that a unit is that of a plain number. Raises ValueError that begins with `place`."""
+        """Impose that a unit is the unit of a plain number. Raises ValueError that begins with `place`."""
         self.require_equal(a, Unit(), place)
         return Unit()
 
@@ -221,7 +221,7 @@ def units_of(
     Args:
         tree: from `parse`.
         parameters: names whose units are unknown.
-        others: exponents of the units of names beside those of `UNITS`.
+        others: exponents of the units of names beside the names in `UNITS`.
 
     Returns:
         Parameter name -> unit as text, for the parameters in the formula.

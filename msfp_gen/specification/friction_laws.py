@@ -1,6 +1,6 @@
 """Friction as data: laws of its coefficient, frictional heating, hysteresis, and what resists spin.
 
-The names in a formula are those of `VARIABLES` and of fields of `Surface`; `mu` is the reference coefficient
+A formula contains names of `VARIABLES` and of fields of `Surface`; `mu` is the reference coefficient
 `Surface.friction`. The formula determines which parameters a surface must define and whether the law needs the pressure
 or a memory of the surface, such as its temperature. The generator derives the equations from the same formula, and
 `scene/friction_parameters.py` evaluates it.

@@ -210,7 +210,7 @@ def _with_other_effects(kind: type[T]) -> type[T]:
 @dataclass(frozen=True)
 @_with_other_effects
 class Auto:
-    """Effects of which those that are None are selected from the scene by stated criteria (docs/effects.md).
+    """Effects, with None for each one that is selected from the scene by stated criteria (docs/effects.md).
 
     Attributes:
         dimension, sliders, rims, uplift: a value of `Effects` to prescribe, or None to select it.

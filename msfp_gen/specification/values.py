@@ -18,7 +18,7 @@ class Value:
     """One number that a run takes.
 
     zero: what 0 means where it is permitted beside the numbers of the rule. base: whether the base has it, of a body.
-    other_unit: in place of that of the rule, for a number of several units.
+    other_unit: in place of the rule's, for a number of several units.
     """
 
     name: str

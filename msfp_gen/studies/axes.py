@@ -92,7 +92,7 @@ class Distribution:
 
 @lru_cache(maxsize=64)
 def _scipy_distribution(kind: str, parameters: tuple[float, ...]) -> Any:
-    """The distribution as of `scipy.stats`; for a lognormal kind, of the logarithm of value over median."""
+    """The distribution as in `scipy.stats`; for a lognormal kind, of the logarithm of value over median."""
     from scipy import stats
 
     if kind == "triangular":
@@ -358,7 +358,7 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-WHOLE = ("building", "bearings")  # tables that a scene of a building reads together; those of other kinds too
+WHOLE = ("building", "bearings")  # tables that a scene of a building reads together; tables of other kinds too
 INTENSITY = "intensity"  # column of the intensity measure of [records]
 
 

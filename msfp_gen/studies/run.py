@@ -89,10 +89,10 @@ def study(
         source: a study file (docs/studies.md), a table of the same keys, or a `Study`.
         output: the folder of the study, for `part-*.parquet` and `study.toml`; made if it does not exist.
         workers: runs at the same time; None: one for each core.
-        executor: an executor (`concurrent.futures`) to run on, such as that of mpi4py or Parsl; it stays open.
+        executor: an executor (`concurrent.futures`) to run on, such as one of mpi4py or Parsl; it stays open.
         dask: address or scheduler file of a Dask cluster to run on.
         shard: (i, n): only every n-th chunk, from the i-th; for job arrays that share `output`.
-        force: also with values of the first or the last run that no unit can make right.
+        force: whether it also runs with values of the first or the last run that no unit can make right.
         progress: called with the number of runs done, by earlier calls too, and the number of runs of the shard.
 
     Raises InputError before any run: invalid input, or a folder with another study; RunError: workers died, or more
@@ -113,7 +113,7 @@ def run_on(
     progress: Progress | None = None,
     without: Collection[int] = (),
 ) -> Outcome:
-    """Run the missing chunks of a study on a pool. Arguments, result and errors: as of `study`.
+    """Run the missing chunks of a study on a pool. Arguments, result and errors: see `study`.
 
     without: numbers of chunks, from 0, that are not run, and not part of the result.
     """
@@ -179,7 +179,7 @@ def _check_failures(study: Study, failed: int, done: int, folder: Path) -> None:
 class ChunkJob(NamedTuple):
     """All that a worker needs for any chunk of a study.
 
-    identity, digest: as of `Chunks`. files: path -> sha256 of the files that the scenes open. timed: whether a part
+    identity, digest: see `Chunks`. files: path -> sha256 of the files that the scenes open. timed: whether a part
     states its core time, for an estimate; without it equal rows have equal bytes.
     """
 

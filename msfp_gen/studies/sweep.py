@@ -120,7 +120,7 @@ def row_of(number: int, variation: Variation, result: AnyResult | RunError, file
 
 
 def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> Path:
-    """Write the rows, sorted by number, as CSV or Parquet; path, name and errors as of `write_columns`.
+    """Write the rows, sorted by number, as CSV or Parquet; path, name and errors as in `write_columns`.
 
     The columns are the varied fields and the quantities of the summaries of bearings and of buildings.
     """

@@ -126,7 +126,7 @@ def worker_count(requested: int | None) -> int:
 def pool_from(
     workers: int | None = None, executor: Executor | None = None, dask: str | None = None
 ) -> AbstractContextManager[Pool]:
-    """The pool for these arguments, as of `study`. Raises InputError where they name two engines."""
+    """The pool for these arguments; see `study`. Raises InputError where they name two engines."""
     if executor is not None and dask is not None:
         raise InputError("executor and dask: give one engine")
     if executor is not None:  # the caller closes it
@@ -202,7 +202,7 @@ _idle: defaultdict[tuple[int, int], list[Workers]] = defaultdict(list)  # this p
 def local_pool(workers: int | None = None, ways: Ways | None = None) -> Iterator[Pool]:
     """Workers of this machine, which live on for later calls. Leaving the block by an error ends all runs.
 
-    workers: their number; None: one for each core. ways: what earlier calls like those of this block told. Raises
+    workers: their number; None: one for each core. ways: what earlier calls like the calls of this block told. Raises
     InputError.
     """
     count = worker_count(workers)
@@ -247,11 +247,11 @@ class Workers(Executor):
     def submit(  # type: ignore[override]
         self, function: Callable[..., T], /, *arguments: Any, report: Report | None = None
     ) -> Future[T]:
-        """As of `Executor`. report: called with the progress of the call; from a process only when it has ended."""
+        """See `Executor`. report: called with the progress of the call; from a process only when it has ended."""
         return self._threads.submit(self._call, function, arguments, report)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """As of `Executor`; calls that run are ended. cancel_futures: also those that run in processes."""
+        """See `Executor`; calls that run are ended. cancel_futures: also those that run in processes."""
         self._stop.set()
         with self._lock:
             if self._processes is not None:
@@ -335,7 +335,7 @@ def _answer(call: bytes) -> tuple[bytes, float, int]:
     """In a process: the value of a call as bytes, its processor time [s], the process. Raises _UnsuitedError."""
     try:
         function, arguments = pickle.loads(call)
-    except Exception as error:  # such as of a class that cannot be imported here
+    except Exception as error:  # such as a class that cannot be imported here
         raise _UnsuitedError(repr(error)) from None
     begin = time.thread_time()
     value = function(*arguments)

@@ -448,7 +448,7 @@ TABLES: list[tuple[Callable[[Any], Any], list[tuple[Any, tuple[str, ...]]]]] = [
             ({"nodes": {}}, ("none carries bearings",)),
             (
                 {"nodes": {"a": (range(6), (0, 0, 0)), "b": (range(3, 9), (0, 0, 0))}},
-                ("coordinate 3 is that of another",),
+                ("coordinate 3 belongs to another",),
             ),
             ({"damping_ratio": 1.5}, ("building.damping_ratio = 1.5: give",)),
             ({"rayleigh_frequencies": (3.0, 2.0)}, ("building.rayleigh_frequencies = (3.0, 2.0): give two rising",)),

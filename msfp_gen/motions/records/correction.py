@@ -30,7 +30,7 @@ class Corrected:
         acceleration: ndarray, shape (k, 3), [m/s^2].
         velocity: ndarray, shape (k, 3), [m/s]; between samples the cubic Hermite interpolant of velocity and
             acceleration.
-        displacement: ndarray, shape (k, 3), [m]; the exact integral of that interpolant, from zero.
+        displacement: ndarray, shape (k, 3), [m]; the exact integral of this interpolant, from zero.
         metadata: description of the processing.
     """
 

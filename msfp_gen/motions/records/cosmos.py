@@ -20,7 +20,7 @@ _SCNL = re.compile(r"<SCNL>\s*\w*\.\w{2}(\w)\.")  # the last letter of the chann
 _LETTERS: dict[str, int | str] = {"Z": UP, "N": 0, "E": 90}
 _START = re.compile(r"Rcrd start time:\s*(.*?)\s*(?:\(|RcrdId|$)", re.I)
 _STATION = re.compile(r"Code:\s*(\S+)", re.I)
-_INTERVAL = 61  # index of the sample interval [ms] of the data; the one at index 33 is that of the recorder
+_INTERVAL = 61  # index of the sample interval [ms] of the data; the one at index 33 is the recorder's
 _END = ("end-of-data", "/&")
 
 

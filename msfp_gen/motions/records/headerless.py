@@ -14,7 +14,7 @@ from msfp_gen.motions.records.text import Lines, even_step
 
 FORMAT = "numbers without a header"
 _BETWEEN = re.compile(r"\s*[,;]\s*|\s+")
-_SEQUENCE = 4  # columns from which the rows of a file with a time step are one sequence, as those of PEER files
+_SEQUENCE = 4  # columns from which the rows of a file with a time step are one sequence, as in PEER files
 
 Row = tuple[int, list[str]]  # index of the line, its fields
 

@@ -76,7 +76,7 @@ class Record:
         for name in ("velocity", "displacement"):
             array = getattr(self, name)
             if array is not None and finite(name, array).shape != values.shape:
-                raise InputError(f"{name}: shape {array.shape}; give that of the acceleration, {values.shape}")
+                raise InputError(f"{name}: shape {array.shape}; give the shape of the acceleration, {values.shape}")
 
     @property
     def time(self) -> Array:

@@ -70,7 +70,7 @@ def arias_intensity(time: Array, acceleration: Array) -> Array:
 def significant_duration(time: Array, acceleration: Array) -> Array:
     """Time between 5 % and 95 % of the Arias intensity of each column: ndarray, shape (c,), [s]; 0 for a zero column.
 
-    Arguments as of `arias_intensity`.
+    Arguments as in `arias_intensity`.
     """
     intensity = arias_intensity(time, acceleration)
     return np.array(

@@ -48,7 +48,7 @@ class ScaleTo:
         sa: pseudo-acceleration at `period` [m/s^2].
         period: period of `sa` [s].
         sds: ordinate of the design spectrum of ASCE 7 at short periods [m/s^2].
-        sd1: ordinate of that spectrum at 1 s [m/s^2].
+        sd1: ordinate of the same spectrum at 1 s [m/s^2].
         long_period: its transition period to constant displacement, T_L [s].
         ag: design ground acceleration of EN 1998-1 on ground of type A, gamma_I a_gR [m/s^2].
         ground: type of the ground of EN 1998-1, A to E. spectrum_type: 1 or 2.
@@ -120,7 +120,7 @@ class ScaleTo:
         return asce7_spectrum(period, self.sds or 0.0, self.sd1 or 0.0, self.long_period)
 
     def factor(self, motion: Record | Corrected | ContinuousMotion, progress: Progress | None = None) -> float:
-        """Factor by which `motion` must be multiplied to meet the target; `progress` as of `response_spectrum`.
+        """Factor by which `motion` must be multiplied to meet the target; `progress` as in `response_spectrum`.
 
         Raises InputError if the component is zero.
         """
@@ -135,7 +135,7 @@ class ScaleTo:
     def ordinates(self) -> tuple[Array, Array]:
         """Periods at which a spectrum is compared with the target [s], and the target there [m/s^2], shape (p,) both.
 
-        Not of a peak acceleration.
+        A target of peak acceleration has none.
         """
         if self.between is None:
             return np.array([self.period], dtype=float), np.array([self.sa], dtype=float)
@@ -219,9 +219,9 @@ def prepared(
     taper: float,
     progress: Progress | None = None,
 ) -> tuple[Corrected, float]:
-    """The processed record and its scale factor; arguments as of `Motion.from_record`.
+    """The processed record and its scale factor; arguments as in `Motion.from_record`.
 
-    `progress` reports the spectrum that `scale_to` needs, as of `response_spectrum`. Raises InputError.
+    `progress` reports the spectrum that `scale_to` needs; see `response_spectrum`. Raises InputError.
     """
     require_type(record, Record, "record")
     arguments = record, start, duration, correct, corner, taper
@@ -315,7 +315,7 @@ def scaled_suite(
 
     Each motion is first scaled to the target by itself, by least squares of the logarithms (`ScaleTo.factor`), so that
     none dominates the mean. One more factor, the same for all, then makes the mean meet the target: the least one for
-    which the mean is nowhere below `least_share` times the target, or, without it, that of least squares of the
+    which the mean is nowhere below `least_share` times the target, or, without it, the factor of least squares of the
     logarithms.
 
     Args:

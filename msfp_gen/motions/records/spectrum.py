@@ -93,7 +93,7 @@ def response_spectrum(
 
     The response to a piecewise linear acceleration is exact (Nigam and Jennings, 1969). For short periods it is
     evaluated between the samples too. After the end of the motion it is continued for one period of free vibration. The
-    geometric mean is that of E1 and E2; RotD50 and RotD100 are the median and the maximum of the peaks in 180
+    geometric mean is taken over E1 and E2; RotD50 and RotD100 are the median and the maximum of the peaks in 180
     horizontal directions (Boore, 2010).
 
     Args:

@@ -141,7 +141,7 @@ def _form(text: str) -> tuple[int, int]:
 
 
 def _has_final_zero(text: str) -> bool:
-    """Whether the decimals of a written number end with a zero, as those of a fixed count do."""
+    """Whether the decimals of a written number end with a zero, as with a fixed count."""
     match = _DECIMALS.match(text)
     return bool(match and (match[1] or "").endswith("0"))
 

@@ -66,7 +66,7 @@ def changed_table(
 def multiplied_table(
     table: Mapping[str, Any], path: str, factor: float, surfaces: Collection[int] | None = None
 ) -> SceneTable:
-    """A copy of a table with the numbers at a path multiplied; arguments and errors as of `changed_table`."""
+    """A copy of a table with the numbers at a path multiplied; arguments and errors as in `changed_table`."""
     changed = dict(table)
     part = path.partition(".")[0]
     with prefixed(f"{path}: "):

@@ -100,8 +100,8 @@ def toml_table(text: str) -> SceneTable:
 def scene_from_table(table: Mapping[str, Any], folder: Path | None = None, parts: Parts = NO_PARTS) -> Scene:
     """The scene of a plain table, as in a scene file.
 
-    folder: that of the scene file, to which paths in the table are relative; None: the working folder, and any path is
-    permitted. parts: those of a scene by name that stand for tables which are left out. Raises InputError.
+    folder: of the scene file, to which paths in the table are relative; None: the working folder, and any path is
+    permitted. parts: of a scene by name; they stand for tables which are left out. Raises InputError.
     """
     parts = scene_parts(schema.SCENE, table, folder, parts)
     if parts.get("top_rotation") is not None and isinstance(parts.get("effects"), Effects):
@@ -114,8 +114,8 @@ def scene_from_table(table: Mapping[str, Any], folder: Path | None = None, parts
 def scene_parts(keys: schema.Keys, table: Mapping[str, Any], folder: Path | None, others: Parts) -> SceneTable:
     """The parts of a scene, of one bearing or of a building, by name.
 
-    keys: of its file. others: those for which there are no tables. Other arguments and errors are those of
-    `scene_from_table`. What is no part stays as validated.
+    keys: of its file. others: parts for which there are no tables. Other arguments and errors as in `scene_from_table`.
+    What is no part stays as validated.
     """
     parts, valid = dict(others), schema.validate(keys, table, others)
     if "motion" in valid:
@@ -132,7 +132,8 @@ def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
 
 
 def load_sheet(source: str | Path, kind: str | None = None) -> tuple[str, Sheet, Bearing]:
-    """Name, data sheet and bearing of a TOML file, of a scene or alone, with `[bearing.sheet]` or those of a building.
+    """Name, data sheet and bearing of a TOML file, of a scene or alone, with `[bearing.sheet]` or the sheets of a
+    building.
 
     kind: name of a table of `[bearings]`; None: the file has one sheet. Raises InputError.
     """
@@ -164,7 +165,7 @@ def parsed_sheet(table: Mapping[str, Any]) -> Sheet:
 def complete_bearing(table: Mapping[str, Any]) -> SceneTable:
     """A `[bearing]` table that states every surface and body, in SI units, of one that names a preset or is complete.
 
-    Coefficients of friction stay those of the table, also where they are at the pivot. Raises InputError.
+    Friction coefficients stay as in the table, also where they are at the pivot. Raises InputError.
     """
     return dict(_complete.value(fingerprint(table), lambda: _completed(table)))
 
@@ -207,7 +208,8 @@ def scene_text(system: Any) -> str:
 def bearing_scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
     """The scene as TOML text from which `load_scene` makes an equal scene; in SI units, with the complete bearing.
 
-    motion: table to write as `[motion]`; None: that of the scene's own motion; an empty table: `[motion]` is omitted.
+    motion: table to write as `[motion]`; None: the table of the scene's own motion; an empty table: `[motion]` is
+    omitted.
     """
     values = {name: getattr(scene, name) for name in ("name", "duration", "output_step")}
     tables = {name: getattr(scene, name) for name in ("effects", *_FIELDS_ALONE)}
@@ -238,7 +240,7 @@ def _bearing(table: Mapping[str, Any]) -> Bearing:
     if "sheet" in changes:
         with errors_at("sheet", "bearing.sheet"):
             values = Sheet(**changes.pop("sheet")).values
-        if "friction_at" in changes:  # where coefficients stay those of the sheet
+        if "friction_at" in changes:  # where coefficients stay as on the sheet
             values["friction_at"] = changes.pop("friction_at")
         return Bearing.of_values(values).replace(**changes)
     with errors_at("layout", "bearing.layout"):
@@ -347,7 +349,7 @@ def load_suite(path: str | Path, progress: Progress | None = None) -> Suite:
 
 
 def suite_from_table(table: SceneTable, folder: Path | None, progress: Progress | None = None) -> Suite:
-    """The suite of a plain table, as in a suite file. folder: as of `scene_from_table`. Raises InputError."""
+    """The suite of a plain table, as in a suite file. folder: see `scene_from_table`. Raises InputError."""
     valid = schema.validate_suite(table)
     if not valid["records"]:
         raise InputError("records = []: give at least one [[records]]")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from msfp_gen.motions.records import Record
 
 MOST_BYTES = 128 << 20  # of the motions that are kept, and of the records
-RECORDS = "MSFP_GEN_RECORDS"  # environment variable: further folders, beside that of the scene file, with records
+RECORDS = "MSFP_GEN_RECORDS"  # environment variable: further folders with records, beside the folder of the scene file
 _LENGTH, _TIME, _COUNT = Quantity("m", above=0.0), Quantity("s", above=0.0), Quantity("", above=0.0)
 _FREQUENCY, _ANGULAR = Quantity("Hz", above=0.0), Quantity("rad/s", above=0.0)
 _TIMES = Quantity("s", least=0.0, shape=(None,))
@@ -284,8 +284,8 @@ class Ramp(MotionTable):
 class RecordMotion(MotionTable):
     """`Motion.from_record`: one file, one file for each component, or a record bundled with the package.
 
-    unit, time_step: of files of numbers without a header, as of `records.read_record`.
-    components: those that are kept; the others are zero. rotated_by: rotation of the horizontal components that are
+    unit, time_step: of files of numbers without a header; see `records.read_record`.
+    components: which are kept; the others are zero. rotated_by: rotation of the horizontal components that are
     kept, about E3 from E1 towards E2. scale_to: a table of the fields of `records.ScaleTo`.
     """
 
@@ -402,7 +402,7 @@ def resolved(file: str | tuple[str, ...], folder: Path | None, name: str = "moti
 def located(table: Mapping[str, Any], folder: Path | None, name: str = "motion") -> dict[str, Any]:
     """The table of a motion with absolute paths of its files, and with the rows of a tabulated target spectrum.
 
-    folder, errors: as of `resolved`; name: of the table.
+    folder, errors: see `resolved`; name: of the table.
     """
     located = dict(table)
     if "file" in located:
@@ -413,7 +413,7 @@ def located(table: Mapping[str, Any], folder: Path | None, name: str = "motion")
 
 
 def with_spectrum(target: Mapping[str, Any], folder: Path | None, name: str) -> dict[str, Any]:
-    """The table of a target with the rows of its spectrum in place of the path of their file; else as of `located`."""
+    """The table of a target with the rows of its spectrum in place of the path of their file; else as in `located`."""
     from msfp_gen.motions.records.scaling import read_spectrum
 
     located = dict(target)
@@ -429,7 +429,7 @@ def _resolved(file: str, folder: Path | None, name: str) -> str:
     try:
         path = ((folder or Path()) / file).resolve()
     except (OSError, ValueError, RuntimeError) as error:  # such as a null character, or a loop of symbolic links
-        raise InputError(f"{name} = {file!r}: this is no path ({error}); give that of a file") from None
+        raise InputError(f"{name} = {file!r}: this is no path ({error}); give the path of a file") from None
     records = os.environ.get(RECORDS, "").split(os.pathsep)
     permitted = [folder, *(Path(record).expanduser() for record in records if record)] if folder is not None else []
     if permitted and not any(path.is_relative_to(record.resolve()) for record in permitted):

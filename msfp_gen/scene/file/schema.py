@@ -90,7 +90,7 @@ class ParsedValue(Reader):
 
     @property
     def remedy(self) -> str:  # type: ignore[override]
-        """That of the rule."""
+        """The remedy of the rule."""
         try:
             self._parse(None, text=True)
         except ValueError as error:
@@ -98,7 +98,7 @@ class ParsedValue(Reader):
         return Reader.remedy
 
     def read(self, value: Any, place: Place, errors: TableErrors) -> Any:
-        """As of `Reader`."""
+        """See `Reader`."""
         try:
             return self._parse(value, text=True)
         except ValueError as error:
@@ -128,7 +128,7 @@ class Keys(Reader):
         return (("", self),)
 
     def read(self, value: Any, place: Place, errors: TableErrors, absent: Collection[str] = ()) -> Any:
-        """As of `Reader`. absent: keys that are not missed."""
+        """See `Reader`. absent: keys that are not missed."""
         value = value if self.short is None else self.short(value)
         if not isinstance(value, Mapping):
             errors.add(f"{place.fact(value)}: give a table")
@@ -149,7 +149,7 @@ class Keys(Reader):
 class OneOf(Reader):
     """One of several tables.
 
-    word: of a table -> its word, or an unknown one. what: to give in place of a value that is no table. short: as of
+    word: of a table -> its word, or an unknown one. what: to give in place of a value that is no table. short: see
     `Keys`.
     """
 
@@ -163,11 +163,11 @@ class OneOf(Reader):
         self.ways, self._word, self._what, self._short = ways, word, what, short
 
     def tables(self) -> Iterable[tuple[str, Keys]]:
-        """Those of all ways."""
+        """The tables of all ways."""
         return self.ways.items()
 
     def read(self, value: Any, place: Place, errors: TableErrors) -> Any:
-        """As of `Reader`."""
+        """See `Reader`."""
         value = value if self._short is None else self._short(value)
         if not isinstance(value, Mapping):
             errors.add(f"{place.fact(value)}: {self._what}")
@@ -186,11 +186,11 @@ class ListOf(Reader):
         self.row = row
 
     def tables(self) -> Iterable[tuple[str, Keys]]:
-        """That of a row."""
+        """The tables of a row."""
         return self.row.tables()
 
     def read(self, value: Any, place: Place, errors: TableErrors) -> Any:
-        """As of `Reader`."""
+        """See `Reader`."""
         if isinstance(value, list | tuple):
             return [self.row.read(row, place.row(index), errors) for index, row in enumerate(value)]
         errors.add(f"{place.fact(value)}: give a list of tables")
@@ -292,7 +292,7 @@ SUITE = Keys(
 
 
 def validate_part(name: str, table: Mapping[str, Any]) -> SceneTable:
-    """The table `[bearing]`, `[top]` or `[solver]` alone, as of `validate`; raises InputError of one line."""
+    """The table `[bearing]`, `[top]` or `[solver]` alone, as in `validate`; raises InputError of one line."""
     return validate(SCENE, {name: table}, SCENE.keys)[name]  # type: ignore[no-any-return]
 
 

@@ -79,7 +79,7 @@ def with_absolute_paths(table: Mapping[str, Any], folder: Path | None) -> dict[s
 
 
 def located_value(path: str, value: Any, folder: Path | None) -> Any:
-    """A value of the field `path` with absolute paths of files; folder, errors: as of `with_absolute_paths`."""
+    """A value of the field `path` with absolute paths of files; folder, errors: see `with_absolute_paths`."""
     keys = keys_of(path)
     nested: Any = value
     for key in reversed(keys):
@@ -95,6 +95,6 @@ def _are_texts(value: Any) -> bool:
 
 
 def _motions(table: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any], tuple[str, ...]]]:
-    """The `[motion]` table, with its place and those of its keys that are paths of files."""
+    """The `[motion]` table, with its place and which of its keys are paths of files."""
     if isinstance(table.get("motion"), dict):
         yield "motion", table["motion"], MOTION_PATHS

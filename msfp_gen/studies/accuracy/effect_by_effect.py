@@ -23,8 +23,8 @@ from msfp_gen.specification.friction_laws import BUILT_IN, VARIABLES, Law, law_o
 from msfp_gen.specification.layout import OF_THE_SCENE, Effects
 
 TOLERANCE = "tolerance"  # in place of an effect, in the row of the numerical error
-TIGHTER = 0.1  # tolerance of the run that measures the numerical error, over that of the scene
-REPEATS, LONG_ENOUGH = 3, 0.3  # runs of which the fastest is timed; one run alone if it takes so long [s]
+TIGHTER = 0.1  # tolerance of the run that measures the numerical error, over the scene's tolerance
+REPEATS, LONG_ENOUGH = 3, 0.3  # runs, and the fastest is timed; one run alone if it takes so long [s]
 
 Say = Callable[[str], None]
 
@@ -50,7 +50,7 @@ class EffectChange:
         effect: field of `Effects`; "tolerance" for the run with the tighter tolerance.
         before, after: its value at the end of the run of the system, and the one tried.
         changes: quantity -> its change, relative to the value of the system; the largest over surfaces or floors [-].
-        cost: seconds of the run over those of the system [-]; None where it could not run.
+        cost: seconds of the run over the seconds of the system [-]; None where it could not run.
         limits: limit -> "within", "exceeded" or "undecided", where it is not what it is for the system.
         why: why it cannot run, in one line; "" where it did.
     """
@@ -179,7 +179,7 @@ def _change(
     effect: str, before: str, after: str, base: Outcome, other: Outcome,
     states: Mapping[str, str], others: Mapping[str, str],
 ) -> EffectChange:  # fmt: skip
-    """How another outcome differs from that of the system."""
+    """How another outcome differs from the system's."""
     limits = {name: state for name, state in others.items() if states.get(name, state) != state}
     changes = {}
     for name, values in base.values.items():

@@ -155,7 +155,7 @@ def model_errors(
     """Error against cost of the given scene and of simplified models, against a reference run of the given scene.
 
     The error of a simplified model falls with its tolerance down to the error of the simplification. Arguments and
-    errors: as of `work_precision`.
+    errors: see `work_precision`.
     """
     check_settings(tolerances, limit)
     scene = without_stop(scene)

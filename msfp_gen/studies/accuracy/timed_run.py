@@ -232,7 +232,7 @@ def refused_trial(method: str, rtol: float, system: System, why: str) -> Trial:
 
 
 def require_base_motion_only(system: System) -> Scene:
-    """The scene of one bearing that the base moves; other methods than those of the runtime ignore all else.
+    """The scene of one bearing that the base moves; methods outside the runtime ignore all else.
 
     Raises InputError for another system, and for a scene with a load or a rotation of the top.
     """

@@ -403,7 +403,7 @@ def fragility_table(result: Fragility) -> Table:
 
 
 def plot_fragility(result: Fragility, path: str | Path | None = None, title: str = "") -> Figure:
-    """Probability of exceedance over intensity: curve, band and shares of every damage state. path: as of `page`."""
+    """Probability of exceedance over intensity: curve, band and shares of every damage state. path: see `page`."""
     intensity = np.concatenate([state.intensity for state in result.states])
     x = np.geomspace(intensity.min(), intensity.max(), DRAWN)
     scale = scale_of([state.threshold for state in result.states], result.unit)

@@ -53,7 +53,7 @@ class Ida:
         fractiles: DataFrame, one row for each intensity: the measure, `curves`, `ended_early`, and one column for each
             fractile, such as `p50`; infinite where the fractile lies among runs that ended early, of a least value
             minus infinity.
-        side: as of `side_of`.
+        side: see `side_of`.
     """
 
     measure: str
@@ -167,7 +167,7 @@ def ida_table(result: Ida) -> Table:
 
 
 def plot_ida(result: Ida, path: str | Path | None = None, title: str = "") -> Figure:
-    """Intensity over demand: every curve, with a cross where a run ended early, and fractiles. path: as of `page`."""
+    """Intensity over demand: every curve, with a cross where a run ended early, and fractiles. path: see `page`."""
     scale = scale_of(result.curves[result.demand], result.unit)
     origin = [0.0] if result.side == "most" else []
     with page(*SIZE, path) as figure:

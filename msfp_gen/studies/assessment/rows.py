@@ -78,7 +78,7 @@ def chosen_rows(rows: Any, conditions: Sequence[str]) -> Any:
 
 
 def write_frame(frame: Any, path: str | Path, name: str = "output") -> Path:
-    """Write a DataFrame without units; path, name and errors as of `write_columns`."""
+    """Write a DataFrame without units; path, name and errors as in `write_columns`."""
     columns = frame.astype(object).where(frame.notna(), None).items()
     return write_columns(path, {(column, ""): values.tolist() for column, values in columns}, name)
 

@@ -123,7 +123,7 @@ def tornado_table(result: Tornado) -> Table:
 
 
 def plot_tornado(result: Tornado, path: str | Path | None = None, title: str = "") -> Figure:
-    """Bars of the quantity between the low and the high value of each axis, longest on top. path: as of `page`."""
+    """Bars of the quantity between the low and the high value of each axis, longest on top. path: see `page`."""
     scale = scale_of([value for bar in result.bars for value in (bar.at_low, bar.at_high)], result.unit)
     base = scale.factor * result.base
     with page(SIZE[0], 1.4 + 0.45 * len(result.bars), path) as figure:

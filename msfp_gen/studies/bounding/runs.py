@@ -190,15 +190,16 @@ def factors_of(scene: System) -> FactorTable:
 def bound(
     scene: System, table: FactorTable = SHEET, *, force: bool = False, progress: Progress | None = None
 ) -> Bounds:
-    """Run a scene with its properties at lower bound, nominal value and upper bound; of a building, of all bearings.
+    """Run a scene with the properties of its bearings at lower bound, nominal value and upper bound.
 
     A case that fails is part of the result, and the other cases are run. All cases have the same effects: where `Auto`
     ends with different models, all cases run again with every effect that any of them needs.
 
-    table: of factors; without it the lower and upper friction of the bearing itself. force: also with values that no
-    unit can make right. progress: called with the share of the runs that is done, and 1. Raises InputError: a bearing
-    without bounds, a factor of a surface that the bearing does not have, a pendulum that is "equivalent" to a stack, or
-    a bearing that does not move; RunError: no case has rows.
+    table: of property modification factors; without it the lower and upper friction of the bearing itself. force:
+    whether it also runs with values that no unit can make right. progress: called with the share of the runs that is
+    done, and 1. Raises
+    InputError: a bearing without bounds, a factor of a surface that the bearing does not have, a pendulum that is
+    "equivalent" to a stack, or a bearing that does not move; RunError: no case has rows.
     """
     require_meant(scene, force=force)
     cases = _cases(scene, table, progress)

@@ -40,7 +40,7 @@ Run = tuple[str, str]  # names of a record and of a case
 DRAWN = ("peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "capacity_left")
 IN_ROW, MOST_BELOW = 3, 14  # panels of the figure in a row; entries of the legend below each other
 WORST: dict[str, Callable[..., Any]] = {"most": np.nanmax, "least": np.nanmin}
-# Kept beside the quantities of which a value governs.
+# Kept beside the quantities that have a governing value.
 OF_RUN = ("duration", "verdict", "verdict_text", "limits_reached", "closure_error", "steps")
 NO_VALUE = "some runs that reached their end have no such value"
 
@@ -128,7 +128,7 @@ class SuiteBounds:
 
     @property
     def undefined(self) -> dict[str, str]:
-        """Column -> why it has no mean, for those of which some runs that reached their end have no value.
+        """Column -> why it has no mean: some runs that reached their end have no value of it.
 
         A column without any value is of something that the runs do not model, such as uplift.
         """
@@ -170,7 +170,7 @@ def suite_study(
     factors: str | Path,
     progress: Progress | None = None,
 ) -> Study:
-    """The study of `bound_suite`: one run for each record, slowest, and each bound. Arguments: as of `bound_suite`.
+    """The study of `bound_suite`: one run for each record, slowest, and each bound. Arguments: see `bound_suite`.
 
     progress: of the scaling of the suite. Raises InputError.
     """
@@ -205,12 +205,12 @@ def bound_suite(
 
     Args:
         study: of scene, suite and factors, by `suite_study`.
-        output: folder of the rows, as of `study`; None: they are not kept.
+        output: folder of the rows, as in `study`; None: they are not kept.
         leave_out: names of records that are neither run nor part of the result.
         workers: runs at the same time; None: one for each core.
         progress: called with the number of runs done, by earlier calls too, and of all.
 
-    Raises InputError: as of `study`, or an unknown record; RunError: no run reached its end.
+    Raises InputError: see `study`, or an unknown record; RunError: no run reached its end.
     """
     from msfp_gen.studies.run import run_on
     from msfp_gen.studies.workers import local_pool
@@ -228,7 +228,7 @@ def load_suite_bounds(folder: str | Path, leave_out: Collection[str] = ()) -> tu
     """The study in the folder of `bound_suite`, and its result.
 
     Raises InputError: no such folder, a file of the inputs or the program has changed, an unknown record, or a run that
-    is missing; RunError as of `bound_suite`.
+    is missing; RunError as in `bound_suite`.
     """
     from msfp_gen.studies.definition import load_study
     from msfp_gen.studies.run import STUDY_FILE, Chunks, study_table
@@ -306,7 +306,7 @@ def _from_rows(study: Study, folder: Path, leave_out: Collection[str]) -> SuiteB
 def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
     """Tables of statistics, and of what is missing in them: one line for each reason.
 
-    The statistics are of the bearing or building as a whole; `write_statistics` writes those of its parts too.
+    The statistics are of the bearing or building as a whole; `write_statistics` writes the statistics of its parts too.
     """
     rows = []
     for statistic in bounds.statistics:
@@ -335,7 +335,7 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
     failed = [(_named(runs), bounds.failures[runs[0]]) for runs in _grouped(bounds.failures, _words).values()]
     tables = [
         Table(f"{_counted(bounds)} at bounds by {bounds.factors}: means and worst values", columns, rows),
-        Table("of which records the numbers are", (), means),
+        Table("the records of the numbers", (), means),
         Table("what has no mean, and why", (), undefined),
         Table("limits of the device that runs exceeded (docs/results.md)", (), exceeded),
         Table("runs that met the stop condition of the scene", (), stopped),

@@ -232,7 +232,7 @@ DRAWN = 24  # tests in a figure, at most: few programs open a larger picture
 
 
 def plot_fit(tests: Sequence[FittedTest], title: str = "fit", path: str | Path | None = None) -> Figure:
-    """Measured and fitted loops of the first 24 tests, each above its residual over time. path: as of `page`."""
+    """Measured and fitted loops of the first 24 tests, each above its residual over time. path: see `page`."""
     plotted, across = tests[:DRAWN], min(len(tests), ACROSS)
     rows = -(-len(plotted) // across)
     with page(max(4.2 * across, 6.0), 6.4 * rows, path, "fit") as figure:

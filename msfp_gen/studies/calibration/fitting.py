@@ -66,7 +66,7 @@ def fit(
             done, and the last deviation [N]. An exception in it ends the fit.
         max_evaluations: largest number of evaluations in the search; the runs with smaller tolerances after the search
             are not counted.
-        force: also from values of the scene that no unit can make right.
+        force: whether it also starts from values of the scene that no unit can make right.
 
     Raises InputError of one line: a file, a parameter or a bound is wrong, or runs of the scene have no gradients.
     RunError: a run of the given scene fails, or the fit has not converged after `max_evaluations`.
@@ -76,7 +76,7 @@ def fit(
 
 
 def end_fit(scene: Scene, residuals: Residuals, max_evaluations: int = 100) -> Fit:
-    """The fit of the residuals of `start_fit`; arguments and RunError as of `fit`."""
+    """The fit of the residuals of `start_fit`; arguments and RunError as in `fit`."""
     start, low, high = search_range(residuals)
     return _fit_of(scene, residuals, solve(residuals, start, low, high, max_evaluations), (low, high))
 
@@ -99,7 +99,7 @@ def start_fit(
     progress: FitProgress | None = None,
     force: bool = False,
 ) -> Residuals:
-    """Check the input of a fit; returns its residuals. Arguments and InputError as of `fit`."""
+    """Check the input of a fit; returns its residuals. Arguments and InputError as in `fit`."""
     if isinstance(tests, str | Path | Measurement) or not tests:
         raise InputError(f"tests = {tests!r}: give a list of files or measurements")
     measured = [test if isinstance(test, Measurement) else read_measurement(test, columns) for test in tests]
@@ -154,7 +154,7 @@ def _fit_of(scene: Scene, residuals: Residuals, solution: Solution, limits: tupl
 
 def _notes(estimates: Sequence[Estimate], tests: Sequence[FittedTest], stiffness: float) -> list[str]:
     """Lines on values at a bound and on tests in which the rig moves. stiffness: of the rig [N/m]."""
-    bound = "is at its bound; its interval, and those of the others, have no meaning"
+    bound = "is at its bound; its interval, and the intervals of the others, have no meaning"
     lines = [f"{estimate.name} {bound}" for estimate in estimates if estimate.at_bound]
     for test in tests:
         share = np.abs(test.force).max() / max(stiffness, 1e-9) / np.abs(test.measured.displacement).max()
@@ -236,7 +236,7 @@ def solve(residuals: Residuals, start: Array, low: Array, high: Array, most: int
     After the search the tolerance of the runs is divided by 100, and then by 10 until the error of the runs is below a
     tenth of half the width of each interval, or the next tolerance would be below 1e-7. Steps at these tolerances use
     the Jacobian of the search (simplified Newton steps). The change of the values by a division measures the error of
-    the runs, of which half is taken as left.
+    the runs; half of it is taken as left.
 
     most: number of evaluations of the search. Raises RunError as `least_squares`; where runs at a smaller tolerance
     fail, the solution before is returned.

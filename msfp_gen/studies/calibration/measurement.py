@@ -106,7 +106,7 @@ def read_measurement(
 
     path: of the file; lines that begin with # are comments. columns: `time`, `displacement`, `force` -> name in the
     header, with a unit in brackets where the header has none, such as {"force": "Load cell 1 [kN]"}; without an entry
-    the name is the same. axial_load, weight: as of `Measurement`.
+    the name is the same. axial_load, weight: see `Measurement`.
 
     Raises InputError of one line that names file, row and column.
     """

@@ -171,7 +171,7 @@ class Residuals:
     """Residuals of the tests as a function of the unknowns over their scales.
 
     tests: sampled. scenes: one for each test. unknowns: without offsets. with_offset: whether the offset of force of
-    each test is a further unknown. progress: as of `fit`. count: number of evaluations. deviation: of the last
+    each test is a further unknown. progress: see `fit`. count: number of evaluations. deviation: of the last
     evaluation [N].
     """
 

@@ -189,7 +189,7 @@ def estimate(
     The folder is the folder of a study with the exact runs; the runs of each cheaper model are a study in a folder
     within it. The same call continues an interrupted estimate.
 
-    source, workers, executor, dask, force: as of `study`. folder: of the study. quantity to seed: as in
+    source, workers, executor, dask, force: see `study`. folder: of the study. quantity to seed: as in
     `Question`, by default the keys of `[accuracy]` in the study file; target and budget also as texts, such as "2 %"
     and "10 min". progress: called with the name of a model and a number of draws before the runs of these draws.
 
@@ -218,7 +218,7 @@ def estimate(
 
 
 def cheaper_models(study: Study) -> list[str]:
-    """The models of which the scene of a study has one, cheapest first."""
+    """The models that the scene of a study has, cheapest first."""
     found = []
     for level in ("equivalent", "massless" if "peak_sliding_1" in study.keep.known else "rigid"):
         with suppress(InputError):
@@ -281,7 +281,7 @@ class _State:
         """What a cheap model gives at the first draws, shape (count, k): its quantities, or whether they exceed.
 
         exact: outcomes of the exact model. In a probability each quantity of the cheap model has the threshold beyond
-        which, or at an early end, as many of the same draws are as of the exact model: midway between two draws, for at
+        which, or at an early end, as many of the same draws lie as in the exact model: midway between two draws, for at
         the least exceedance too few of all others lie beyond.
         """
         values, early = self.source.values(level, count)
@@ -449,7 +449,7 @@ def estimate_table(result: Estimate) -> Table:
 
 
 def plot_estimate(result: Estimate, path: str | Path | None = None, title: str = "") -> Figure:
-    """Half the width of the interval over core time, round by round, beside plain Monte Carlo. path: as of `page`."""
+    """Half the width of the interval over core time, round by round, beside plain Monte Carlo. path: see `page`."""
     seconds, half = np.array(result.trace).T
     with page(WIDTH, HEIGHT, path) as figure:
         headline(figure, title or f"{result.statistic} of {labelled(result.quantity, '')}: what an interval costs")

@@ -4,7 +4,7 @@ Control variates with estimated coefficients: Glasserman, *Monte Carlo Methods i
 section 4.1; in sampling the regression estimator (Cochran, *Sampling Techniques*, 3rd edition, 1977, section 12.6). The
 exact model runs the first n draws, the cheap one the first m of the same draws; what the cheap model gives over all m
 corrects the mean over n by a linear regression. A probability is the mean of the exceedances, 0 or 1, of both models,
-and its interval is that of Wilson for as many independent draws as have its variance (Franco, Little, Louis and Slud,
+and its interval is Wilson's for as many independent draws as have its variance (Franco, Little, Louis and Slud,
 *Journal of Survey Statistics and Methodology* 7 (2019), 334-364).
 
 Numbers of runs are the optimum of two-level Monte Carlo: Peherstorfer, Willcox and Gunzburger, *SIAM Journal on
@@ -114,7 +114,7 @@ def mean_of(
 
 
 def work(correlation: float, cost: float) -> float:
-    """Time for a given variance, over that of exact runs alone; cost: of a cheap run, over that of an exact one [-]."""
+    """Time for a given variance, over the time of exact runs alone. cost: of a cheap run, over an exact one's [-]."""
     return float((sqrt(max(1 - correlation**2, 0.0)) + abs(correlation) * sqrt(cost)) ** 2)
 
 

@@ -120,17 +120,17 @@ class StudySource:
         self._progress = progress
 
     def values(self, level: str, count: int) -> tuple[Array, Flags]:
-        """As of `Source`."""
+        """See `Source`."""
         if self._progress is not None:
             self._progress(level, count)
         return self._models[level].values(count)
 
     def cost(self, level: str) -> float:
-        """As of `Source`."""
+        """See `Source`."""
         return self._models[level].cost()
 
     def spent(self) -> tuple[float, dict[str, int]]:
-        """As of `Source`."""
+        """See `Source`."""
         runs = {level: model.count for level, model in self._models.items() if model.count}
         return sum(count * self.cost(level) for level, count in runs.items()), runs
 
@@ -197,7 +197,7 @@ class _Model:
 
 
 def level_study(study: Study, level: str, quantity: str) -> Study:
-    """The study of one model: the exact model keeps all quantities of the study, any other those of `names_of`."""
+    """The study of one model: the exact model keeps all quantities of the study, any other keeps `names_of`."""
     chunk = CHUNKS.get(level, CHUNK)
     if level == EXACT:
         return replace(study, given_chunk=study.given_chunk or chunk)

@@ -248,7 +248,7 @@ def test_nodes_of_one_rigid_body_share_its_coordinates():
     linked = replace(base, name="corner", position=corner, rows=base.linked(corner))
     assert replace(frame, nodes=(*frame.nodes, linked)).boundary == frame.boundary
     bent = replace(linked, rows=linked.rows * np.array([2.0, 1, 1, 1, 1, 1])[:, None])
-    with pytest.raises(InputError, match=r"building\.nodes\['corner'\]: coordinate 0 is that of another node"):
+    with pytest.raises(InputError, match=r"building\.nodes\['corner'\]: coordinate 0 belongs to another node"):
         _ = replace(frame, nodes=(*frame.nodes, bent)).boundary
     with pytest.raises(InputError, match="frequency = 0"):
         Building.shear(BASE, [STOREY]).reduced(0)

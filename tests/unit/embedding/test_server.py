@@ -127,10 +127,10 @@ def test_a_failed_bearing_answers_nan_until_a_shorter_step_succeeds():
     "sizes, word",
     [
         ([9, 9, 9, 0, 1, 0, 0, 0, 9, 0, 256], "9 degrees of freedom"),
-        ([12, 12, 12, 0, 1, 0, 0, 0, 12, 0, 30], "not those of an element genericClient"),
-        ([12, 12, 0, 0, 1, 0, 0, 0, 12, 0, 256], "not those of an element genericClient"),
-        ([12, 12, 12, 0, 1, 0, 0, 0, 12, 0, 2**30], "not those of an element genericClient"),
-        ([-12, -12, -12, 0, 1, 0, 0, 0, -12, 0, 256], "not those of an element genericClient"),
+        ([12, 12, 12, 0, 1, 0, 0, 0, 12, 0, 30], "an element genericClient of OpenSees sends others"),
+        ([12, 12, 0, 0, 1, 0, 0, 0, 12, 0, 256], "an element genericClient of OpenSees sends others"),
+        ([12, 12, 12, 0, 1, 0, 0, 0, 12, 0, 2**30], "an element genericClient of OpenSees sends others"),
+        ([-12, -12, -12, 0, 1, 0, 0, 0, -12, 0, 256], "an element genericClient of OpenSees sends others"),
     ],
 )
 def test_another_client_is_refused(sizes: list[int], word: str):
@@ -165,7 +165,7 @@ def test_a_scene_with_a_rig_gives_its_two_port():
     "name, word",
     [
         ("fenz-test2", "top.vertical_stiffness = 0"),
-        ("ridgecrest-clc", "top.kind = 'mass': the interface of a two-port is that of a rig"),
+        ("ridgecrest-clc", "top.kind = 'mass': a two-port needs the interface of a rig"),
         ("fenz-monotonic", "stop: the ends of a two-port give motion and load"),
     ],
 )

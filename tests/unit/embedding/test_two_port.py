@@ -188,7 +188,7 @@ def test_at_the_committed_time_the_committed_wrench_is_given():
     "time, lower, upper, word",
     [
         (0.02, STILL, STILL, "time = 0.02: the committed state is at 0.03"),
-        (0.03, STILL, STILL, "time = 0.03: it is that of the committed state"),
+        (0.03, STILL, STILL, "time = 0.03: the committed state has this time"),
         (0.03 + 1e-10, STILL, STILL, "give a later time"),
         (np.nan, STILL, STILL, "time = nan"),
         ("1", STILL, STILL, "time = '1'"),

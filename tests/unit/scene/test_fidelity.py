@@ -226,7 +226,7 @@ def test_surfaces_of_one_pendulum_are_none_of_the_device(tmp_path):
 def test_values_of_the_stack_are_none_of_its_equivalent():
     """A factor on surface 1 would be one on the whole pendulum: 10 % too much force."""
     scene = changed_scene("fenz-test2", {"fidelity": "equivalent"})
-    refused = "fidelity = 'equivalent': its surfaces are those of one pendulum"
+    refused = "fidelity = 'equivalent': its surfaces make one pendulum"
     with pytest.raises(InputError, match=refused):
         bound(scene, load_factors("asce7"))
     with pytest.raises(InputError, match=refused):

@@ -1,4 +1,4 @@
-"""Presets by name: bearings and scenes, TOML files in this folder, and those of other kinds of systems."""
+"""Presets by name: bearings and scenes, TOML files in this folder, and presets of other kinds of systems."""
 
 from __future__ import annotations
 
