@@ -28,7 +28,7 @@ ROWS = 6  # statements in one block; long blocks do not render everywhere
 
 INTRODUCTION = r"""# The equations, as the generator writes them
 
-Written by `docs/make_equations.py` from the same programs that become C; do not edit. Equation numbers are those of
+Written by `docs/make_equations.py` from the same programs that become C; do not edit. Equation numbers follow
 PEER Report 2017/07 ("PEER 2017/07"); [model.md](model.md) explains what is computed and why, and
 [glossary.md](glossary.md) the terms.
 
@@ -61,7 +61,7 @@ stack.
   $-F_{top}, -M_{top}$. $F_E, M_E$ is the prescribed part of $F_{top}, M_{top}$.
 - $r_{s\gamma}, p_{s\gamma}$ are rim radius and rim offset of the slider of surface $\gamma$.
 - $S_{\psi_k}, C_{\psi_k}, S_{\theta_k}, C_{\theta_k}$ are sines and cosines of the angles of body $k$.
-- $E$ are energies [J], $D$ powers that are dissipated and $\dot{W}$ powers of the input [W]; those of friction are
+- $E$ are energies [J], $D$ powers that are dissipated and $\dot{W}$ powers of the input [W]; the powers of friction are
   $\dot{E}_f$, stored, $D_c$, dissipated by contact damping, $D_d$ by the drilling moment, and $D_f$ by the rest.
 - $c_n(s)$ are the Stumpff functions, $c_1(x^2) = \sin x/x$ and $c_2(x^2) = (1 - \cos x)/x^2$.
 - $\operatorname{if}(x, a, b)$ is $a$ for $x > 0$ and $b$ otherwise; $\operatorname{decay}(x)$ is $e^{-x}$ for $x > 0$
@@ -69,8 +69,8 @@ stack.
 - Friction over a slip is of planar models without masses. In a step of such a model the body above turns by
   $\alpha + \beta\,\Delta\omega'$, $Y^0$ and $Y^1$ are $Y$ at its ends and $\bar{N}$ is the mean normal force. $W_f$ is
   the work [J] that friction stores and $W_d$ the work that it dissipates.
-- $\eta_V$ is 1 without uplift; with it the compliance of the vertical spring and of the unilateral contacts over that
-  of the spring.
+- $\eta_V$ is 1 without uplift; with it it is the compliance of the vertical spring and of the unilateral contacts
+  over the compliance of the spring.
 - $x_1, x_2, \dots$ are local intermediate values of a program."""
 
 SCHEDULE = r"""## One evaluation of a stack

@@ -1,4 +1,4 @@
-"""Public docstrings state shape and unit of arrays that functions return, and of attributes; private ones are short."""
+"""Public docstrings state shape and unit of arrays, private ones are short; texts say the noun again, not "that of"."""
 
 from __future__ import annotations
 
@@ -137,7 +137,9 @@ def public_docstrings(node: ast.Module | ast.ClassDef) -> Iterator[str]:
             yield ast.get_docstring(item) or ""
 
 
-def test_public_docstrings_say_the_noun_again() -> None:
-    texts = [(path, text) for path in SOURCES for text in public_docstrings(ast.parse(path.read_text("utf-8")))]
+def test_pages_and_public_docstrings_say_the_noun_again() -> None:
+    pages = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/*.md*")]
+    texts = [(path, path.read_text("utf-8")) for path in pages if path.name != "CHANGELOG.md"]
+    texts += [(path, text) for path in SOURCES for text in public_docstrings(ast.parse(path.read_text("utf-8")))]
     found = [(path.name, hit[0]) for path, text in texts if (hit := NOT_REPEATED.search(" ".join(text.split())))]
     assert not found, found
