@@ -28,9 +28,9 @@ ROWS = 6  # statements in one block; long blocks do not render everywhere
 
 INTRODUCTION = r"""# The equations, as the generator writes them
 
-Written by `docs/make_equations.py` from the same programs that become C; do not edit. Equation numbers follow
-PEER Report 2017/07 ("PEER 2017/07"); [model.md](model.md) explains what is computed and why, and
-[glossary.md](glossary.md) the terms.
+For readers who want the equations in full. `docs/make_equations.py` writes this page from the same programs that become
+C; do not edit it. Equation numbers follow PEER Report 2017/07 ("PEER 2017/07"); [model.md](model.md) explains what is
+computed and why, and [glossary.md](glossary.md) the terms.
 
 ## A small stack, assembled
 

@@ -31,11 +31,10 @@ from quick import docs_folder, parser
 
 INTRODUCTION = """# Scene files: every key
 
-Written by `docs/make_scene_reference.py` from the schema that reads scene files; do not edit.
-
-A scene is a TOML file. Numbers are SI; a text may carry a unit (`"75 mm"`). Unknown keys are errors. The
-[tutorial](tutorial.md) builds a scene step by step, `msfp-gen explain SCENE` prints one as the program reads it.
-Surfaces and bodies are listed from the bottom; body 1 is the base, `[[bearing.bodies]]` begins with body 2.
+For engineers who write a scene. A scene is a TOML file. Numbers are SI; a text may carry a unit (`"75 mm"`). Unknown
+keys are errors. The [tutorial](tutorial.md) builds a scene step by step, `msfp-gen explain SCENE` prints one as the
+program reads it. Surfaces and bodies are listed from the bottom; body 1 is the base, `[[bearing.bodies]]` begins with
+body 2. `docs/make_scene_reference.py` writes this page from the schema that reads scene files; do not edit it.
 """
 
 KIND = "Which of the tables of this section it is."
