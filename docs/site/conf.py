@@ -42,8 +42,13 @@ html_theme_options: dict[str, Any] = {
     "navigation_with_keys": False,
     "show_nav_level": 1,
     "show_prev_next": False,
-    # Pages of one wide table, and the gallery, use the whole width.
-    "secondary_sidebar_items": {"docs/validation": [], "docs/other-programs": [], "gallery/**": []},
+    # Pages of one wide table, and the gallery of examples, use the whole width.
+    "secondary_sidebar_items": {
+        "**": ["page-toc"],
+        "docs/validation": [],
+        "docs/other-programs": [],
+        "gallery/index": [],
+    },
     "header_links_before_dropdown": 8,
     "footer_start": ["copyright"],
     "footer_end": [],

@@ -90,6 +90,7 @@ def check_site(folder: Path) -> None:
     assert users == ["search.html"], "only the search loads the texts of all pages"
     assert "msfp-gen explain" in (folder / "cli.html").read_text(encoding="utf-8")
     model = (folder / "docs" / "model.html").read_text(encoding="utf-8")
+    assert "On this page" in model, "a long page lists its sections"
     assert "<math" in model and "$" not in re.sub(
         r"<(code|pre).*?</\1>", "", model.partition("<article")[2].partition("</article")[0], flags=re.DOTALL
     )
