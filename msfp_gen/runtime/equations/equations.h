@@ -121,14 +121,18 @@ enum { MSFP_LOCAL_UNKNOWNS = MSFP_FRICTION_FORCE_SIZE + MSFP_LAW };
  * them. The matrix of local unknowns is near the identity and needs no pivots. */
 MSFP_INLINE void msfp_eliminate(int unknowns, int columns, double (*a)[MSFP_LANES])
 {
+    MSFP_UNROLL
     for (int k = 0; k < unknowns; ++k) {
         double inverse[MSFP_LANES];
         for (int s = 0; s < MSFP_LANES; ++s)
             inverse[s] = 1.0 / a[k * columns + k][s];
+        MSFP_UNROLL
         for (int c = k + 1; c < columns; ++c)
             for (int s = 0; s < MSFP_LANES; ++s)
                 a[k * columns + c][s] *= inverse[s];
+        MSFP_UNROLL
         for (int r = 0; r < unknowns; ++r)
+            MSFP_UNROLL
             for (int c = k + 1; c < columns && r != k; ++c)
                 for (int s = 0; s < MSFP_LANES; ++s)
                     a[r * columns + c][s] -= a[r * columns + k][s] * a[k * columns + c][s];
