@@ -1,4 +1,4 @@
-/* newton.c: Newton's method on the equations of one stage. docs/stability.md lists what is tried where it fails. */
+/* newton.c: Newton's method on the equations of one stage. docs/robustness.md lists what is tried where it fails. */
 #include <math.h>
 #include <string.h>
 #include "steppers.h"
