@@ -50,7 +50,7 @@ def characterise(
     as_json: AsJson = False,
     force: Force = False,
 ) -> None:
-    """Effective stiffness, damping, sliding regimes, capacity left, velocity and heat of a run, with envelopes."""
+    """State stiffness, damping, sliding regimes, capacity left, velocity and heat of a run, with envelopes."""
     from msfp_gen.common.output import check_output
     from msfp_gen.results.characterise import CSV_SUFFIXES, write_csv
 

@@ -64,7 +64,7 @@ def shadow(
     output: Output = None,
     as_json: AsJson = False,
 ) -> None:
-    """Drive the full model by a recorded motion and axial force; which effects the other program's element lacks."""
+    """Drive the full model by a recorded motion and axial force; name effects that the other element lacks."""
     from msfp_gen.auditing.shadow import shadow as run_shadow
     from msfp_gen.report.frames import REPORT_SUFFIXES
     from msfp_gen.results.files import check_result_path, save

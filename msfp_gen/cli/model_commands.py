@@ -227,7 +227,7 @@ def export(
         ),
     ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Of a run: write .csv or .parquet.")
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write the rows of a run: .csv or .parquet.")
     ] = None,
     columns: Annotated[
         str | None,
@@ -236,11 +236,11 @@ def export(
     sign: SignOption = DEFAULT,
     prefix: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Of layouts: write a C library there. The effects below are for this."),
+        typer.Option(metavar="DIR", help="Write a C library of layouts there. The effects below are for this."),
     ] = None,
     target: Annotated[
         str | None,
-        typer.Option(metavar="PLATFORM", help=f"Of the C library, if not this machine: {', '.join(TARGETS)}."),
+        typer.Option(metavar="PLATFORM", help=f"Platform of the C library, if not this machine: {', '.join(TARGETS)}."),
     ] = None,
     force: Force = False,
     *,

@@ -33,11 +33,14 @@ def record(
         typer.Argument(metavar="FILE...", help="A record, one file per component, or the name of a bundled one."),
     ],
     unit: Annotated[
-        str | None, typer.Option(metavar="UNIT", help="Of the numbers in files without a header: g, cm/s2, m/s, ...")
+        str | None,
+        typer.Option(metavar="UNIT", help="Unit of the numbers in files without a header: g, cm/s2, m/s, ..."),
     ] = None,
     time_step: Annotated[
         float | None,
-        typer.Option(parser=number, metavar="SECONDS", help="Of files without a header and without a column of times."),
+        typer.Option(
+            parser=number, metavar="SECONDS", help="Time between rows, where files have no header and no times."
+        ),
     ] = None,
     components: Annotated[
         str | None, typer.Option(metavar="E1,E2,E3", help="Components to keep; the others are zero.")

@@ -19,7 +19,7 @@ SheetFile = Annotated[
 
 OfBuilding = Annotated[
     str | None,
-    typer.Option("--bearing", metavar="NAME", help="Of a building with several sheets: which of [bearings]."),
+    typer.Option("--bearing", metavar="NAME", help="Which of [bearings], where a building has several sheets."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else.")]
 

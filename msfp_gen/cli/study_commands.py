@@ -86,14 +86,16 @@ def run(
         str | None,
         typer.Option(metavar="COLUMN", help="Estimate a statistic of this quantity with few exact runs ([accuracy])."),
     ] = None,
-    statistic: Annotated[str | None, typer.Option(metavar="mean|probability", help="Of the estimate.")] = None,
+    statistic: Annotated[str | None, typer.Option(metavar="mean|probability", help="Statistic to estimate.")] = None,
     threshold: Annotated[
-        str | None, typer.Option(metavar="VALUE", help="Of a probability: the value that is reached.")
+        str | None, typer.Option(metavar="VALUE", help="Value to be reached, for a probability.")
     ] = None,
     target: Annotated[
         str | None, typer.Option(metavar="SHARE", help="Half width of the interval over the value, such as 2%.")
     ] = None,
-    budget: Annotated[str | None, typer.Option(metavar="TIME", help="Of all runs of the estimate: 10min.")] = None,
+    budget: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Core time of the estimate, such as 10min.")
+    ] = None,
     plot: Plot = None,
     force: Force = False,
     as_json: AsJson = False,
@@ -163,7 +165,7 @@ def _report(done: Outcome, output: Path, as_json: bool, judged: bool) -> None:
 
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study status out\n  msfp-gen study status out --json")
 def status(folder: Folder, as_json: AsJson = False) -> None:
-    """How far a study has come, how fast it is, and how long it will still take."""
+    """State how far a study has come, how fast it is, and how long it will still take."""
     from msfp_gen.studies.run import status_table, study_status
 
     progress = study_status(folder)
@@ -183,7 +185,7 @@ def ida(
     output: Output = None,
     as_json: AsJson = False,
 ) -> None:
-    """Curves of demand over intensity, one for each record, and their fractiles."""
+    """Draw curves of demand over intensity, one for each record, and their fractiles."""
     from msfp_gen.studies.assessment import ida as module
     from msfp_gen.studies.assessment.rows import chosen_rows, read_study
 
@@ -226,7 +228,7 @@ def fragility(
     output: Output = None,
     as_json: AsJson = False,
 ) -> None:
-    """Lognormal fragility curves by maximum likelihood, with confidence bands, one for each threshold."""
+    """Fit lognormal fragility curves by maximum likelihood, with confidence bands, one for each threshold."""
     from msfp_gen.studies.assessment import fragility as module
     from msfp_gen.studies.assessment.rows import chosen_rows, read_study
 
@@ -248,7 +250,7 @@ def tornado(
     output: Output = None,
     as_json: AsJson = False,
 ) -> None:
-    """The change of a quantity with each random axis alone; for `sampling.method = "one-at-a-time"`."""
+    """State the change of a quantity with each random axis alone; for `sampling.method = "one-at-a-time"`."""
     from msfp_gen.studies.assessment import sensitivity as module
 
     _check(plot, output)
