@@ -20,8 +20,9 @@ author = "The msfp-gen developers"
 copyright = author
 version = release = __version__
 
-sys.path.insert(0, str(Path(__file__).parent))  # gallery_settings, excerpts
+sys.path.insert(0, str(Path(__file__).parent))  # gallery_settings, excerpts, terms
 import excerpts  # noqa: E402
+import terms  # noqa: E402
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 if os.environ.get("MSFP_GEN_SITE_GALLERY") == "1":  # the gallery runs every example
@@ -38,17 +39,12 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"msfp-gen {release}"
 html_show_sourcelink = False
 html_copy_source = False
+html_sidebars = {"**": ["sidebar-collapse", "sidebar-nav-bs", "page-toc"], "index": [], "search": []}
 html_theme_options: dict[str, Any] = {
     "navigation_with_keys": False,
     "show_nav_level": 1,
     "show_prev_next": False,
-    # Pages of one wide table, and the gallery of examples, use the whole width.
-    "secondary_sidebar_items": {
-        "**": ["page-toc"],
-        "docs/validation": [],
-        "docs/other-programs": [],
-        "gallery/index": [],
-    },
+    "secondary_sidebar_items": [],  # the page's contents stand under the section's: code and tables need the width
     "header_links_before_dropdown": 8,
     "footer_start": ["copyright"],
     "footer_end": [],
@@ -67,6 +63,7 @@ napoleon_use_rtype = False
 napoleon_use_ivar = True
 python_use_unqualified_type_names = True
 default_role = "code"
+highlight_language = "text"  # blocks without a language are commands and what they print
 nitpicky = False
 
 SECTIONS = [f"examples/gallery/{name}" for name in ("bearings", "design", "buildings", "equations", "programs")]
@@ -103,6 +100,7 @@ def _block(writer: Any, node: nodes.math_block) -> None:
 def setup(app: Sphinx) -> None:
     """Formulas become MathML, which browsers draw without a script; the search shows excerpts without a server."""
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
+    app.add_transform(terms.Entries)
     app.connect("html-page-context", excerpts.only_on_search)
     app.connect("build-finished", excerpts.write)
 
