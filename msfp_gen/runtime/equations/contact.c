@@ -71,13 +71,28 @@ MSFP_INLINE void scatter(const lanes *all, msfp_work *w, double g[NB][2])
     }
 }
 
+/* Solve the 1x1 or 2x2 system a x = b of every lane, in place of b. */
+MSFP_INLINE void solve_small(const double *a, double *b)
+{
+    for (int s = 0; s < LANES; ++s) {
+#if MSFP_PLANAR
+        b[s] /= a[s];
+#else
+        const double inverse = 1.0 / (a[s] * a[3 * LANES + s] - a[LANES + s] * a[2 * LANES + s]);
+        const double x = (b[s] * a[3 * LANES + s] - a[LANES + s] * b[LANES + s]) * inverse;
+        b[LANES + s] = (a[s] * b[LANES + s] - a[2 * LANES + s] * b[s]) * inverse;
+        b[s] = x;
+#endif
+    }
+}
+
 /* One Newton step on g (and mu) of every surface that has not converged, with derivatives at constant slip velocity
  * and N, on which they depend weakly. Where the residual has grown, past a switch of the hysteresis law, half of the
  * last step is taken back. held: mu stays as it is, whatever its law gives. Returns how many surfaces have not
  * converged, -1 if a value is not finite. */
 MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, int held, double *step, double *best)
 {
-    double a[FRICTION][FRICTION + 1][LANES], size[LANES], sum[LANES];
+    double a[FRICTION * FRICTION * LANES], newton[FRICTION * LANES], size[LANES], sum[LANES];
     const double *out = all->out, *tau = all->stage + MSFP_FRICTION_STAGE_TAU * LANES;
     int unconverged = 0, not_finite = 0;
     (void)held; /* of a law alone */
@@ -87,7 +102,7 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, int held, 
         for (int s = 0; s < LANES; ++s) {
             const double rest = all->g[r * LANES + s] - all->stage[r * LANES + s] -
                                 tau[s] * out[(MSFP_CONTACT_DY + r) * LANES + s];
-            a[r][FRICTION][s] = rest;
+            newton[r * LANES + s] = rest;
             size[s] = fabs(rest) > size[s] ? fabs(rest) : size[s];
             sum[s] += fabs(rest);
         }
@@ -105,11 +120,10 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, int held, 
     }
     if (not_finite || !unconverged)
         return not_finite ? -1 : 0;
-    for (int r = 0; r < FRICTION; ++r)
-        for (int c = 0; c < FRICTION; ++c)
-            for (int s = 0; s < LANES; ++s)
-                a[r][c][s] = (r == c) - beta * out[(MSFP_CONTACT_YY + r * FRICTION + c) * LANES + s];
-    msfp_eliminate(FRICTION, FRICTION + 1, a[0]);
+    for (int i = 0; i < FRICTION * FRICTION; ++i)
+        for (int s = 0; s < LANES; ++s)
+            a[i * LANES + s] = (i % (FRICTION + 1) == 0) - beta * out[(MSFP_CONTACT_YY + i) * LANES + s];
+    solve_small(a, newton);
     for (int s = 0; s < LANES; ++s) {
         const int converged = size[s] <= accuracy * (1.0 + fabs(tau[s] * out[MSFP_CONTACT_DY * LANES + s]));
         const int overshot = size[s] > best[s];
@@ -117,13 +131,13 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, int held, 
 #if MSFP_LAW
         double change = excess[s];
         for (int c = 0; c < FRICTION; ++c)
-            change += out[(MSFP_CONTACT_LAW_Y + c) * LANES + s] * a[c][FRICTION][s];
+            change += out[(MSFP_CONTACT_LAW_Y + c) * LANES + s] * newton[c * LANES + s];
         change = overshot ? 0.5 * step[FRICTION * LANES + s] : change / (1.0 - SLOPE(out, s));
         step[FRICTION * LANES + s] = change;
         all->x[s] += held ? 0.0 : sign * change;
 #endif
         for (int r = 0; r < FRICTION; ++r) {
-            step[r * LANES + s] = overshot ? 0.5 * step[r * LANES + s] : a[r][FRICTION][s];
+            step[r * LANES + s] = overshot ? 0.5 * step[r * LANES + s] : newton[r * LANES + s];
             all->g[r * LANES + s] += sign * step[r * LANES + s];
         }
         best[s] = overshot ? best[s] : size[s];

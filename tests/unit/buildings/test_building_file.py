@@ -218,7 +218,7 @@ def table() -> dict:
         (
             "building.bearing.0.bearing",
             "cornre",
-            r"^building\.bearing\[0\]\.bearing = 'cornre': no preset .* \[bearings\] are corner",
+            r"^building\.bearing\[0\]\.bearing = 'cornre': no preset .* \[bearings\] has corner",
         ),
         ("building.bearing.0.node", "roof", r"bearings\[0\]\.node = 'roof'"),
         ("building.bearing.0.position", [1.0], r"building\.bearing\[0\]\.position = \[1\.0\]: give 2"),
