@@ -291,7 +291,7 @@ MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
                 a[r][c][s] = c < UNKNOWNS ? (r == c) - scaled : scaled;
             }
         }
-    msfp_eliminate(UNKNOWNS, UNKNOWNS + INPUTS, a[0]);
+    msfp_eliminate_friction(UNKNOWNS + INPUTS, a[0]);
     /* Of the source of a memory only gradients need derivatives (msfp_tangent_with_slopes). */
     memset(condensed + SOURCE * INPUTS * LANES, 0, (MSFP_CONTACT_ROWS - SOURCE) * INPUTS * LANES * sizeof *condensed);
     for (int r = 0; r < SOURCE; ++r) {
@@ -302,7 +302,7 @@ MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
                 sum[s] = row[k * LANES + s];
             for (int c = 0; c < UNKNOWNS; ++c)
                 for (int s = 0; s < LANES; ++s)
-                    sum[s] += row[(INPUTS + c) * LANES + s] * a[c][UNKNOWNS + k][s];
+                    sum[s] += row[(INPUTS + c) * LANES + s] * a[c][UNKNOWNS + k][s] / a[c][c][s];
         }
     }
 }

@@ -117,26 +117,19 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
 
 /* Local unknowns of a contact: the friction force over -mu N, and mu where it follows a law. */
 enum { MSFP_LOCAL_UNKNOWNS = MSFP_FRICTION_FORCE_SIZE + MSFP_LAW };
-/* Solve for the first `unknowns` of the columns of [unknowns][columns][lane]: the others become what the unknowns are by
- * them. The matrix of local unknowns is near the identity and needs no pivots. */
-MSFP_INLINE void msfp_eliminate(int unknowns, int columns, double (*a)[MSFP_LANES])
+/* Eliminate them from derivatives [MSFP_LOCAL_UNKNOWNS][inputs][lane] of their equations by inputs, the unknowns first: by
+ * the others they are their row over its diagonal entry. Their matrix is near the identity and needs no pivots. */
+MSFP_INLINE void msfp_eliminate_friction(int inputs, double (*a)[MSFP_LANES])
 {
-    MSFP_UNROLL
-    for (int k = 0; k < unknowns; ++k) {
-        double inverse[MSFP_LANES];
-        for (int s = 0; s < MSFP_LANES; ++s)
-            inverse[s] = 1.0 / a[k * columns + k][s];
-        MSFP_UNROLL
-        for (int c = k + 1; c < columns; ++c)
+    for (int k = 0; k < MSFP_LOCAL_UNKNOWNS; ++k)
+        for (int r = 0; r < MSFP_LOCAL_UNKNOWNS; ++r) {
+            double factor[MSFP_LANES];
             for (int s = 0; s < MSFP_LANES; ++s)
-                a[k * columns + c][s] *= inverse[s];
-        MSFP_UNROLL
-        for (int r = 0; r < unknowns; ++r)
-            MSFP_UNROLL
-            for (int c = k + 1; c < columns && r != k; ++c)
+                factor[s] = a[r * inputs + k][s] / a[k * inputs + k][s];
+            for (int c = k + 1; c < inputs && r != k; ++c)
                 for (int s = 0; s < MSFP_LANES; ++s)
-                    a[r * columns + c][s] -= a[r * columns + k][s] * a[k * columns + c][s];
-    }
+                    a[r * inputs + c][s] -= factor[s] * a[k * inputs + c][s];
+        }
 }
 /* Y, Z and the contact of all surfaces; g as of msfp_condensed. condensed: Jacobian [MSFP_CONTACT_ROWS] with respect to the
  * inputs of a surface, with g (and mu) eliminated, lane by lane; or NULL. Returns a status. */

@@ -46,7 +46,15 @@ MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, dou
                 a[r][given ? UNKNOWNS + i : i - GIVEN][s] = given ? slope : (i - GIVEN == r) - slope;
             }
         }
-    msfp_eliminate(UNKNOWNS, INPUTS, a[0]);
+    msfp_eliminate_friction(INPUTS, a[0]);
+    for (int u = 0; u < UNKNOWNS; ++u) {
+        double inverse[LANES];
+        for (int s = 0; s < LANES; ++s)
+            inverse[s] = 1.0 / a[u][u][s];
+        for (int i = UNKNOWNS; i < INPUTS; ++i)
+            for (int s = 0; s < LANES; ++s)
+                a[u][i][s] *= inverse[s];
+    }
     for (int r = 0; r < rows; ++r)
         for (int i = 0; i < GIVEN; ++i)
             for (int s = 0; s < LANES; ++s) {
