@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from os import getloadavg
 from pathlib import Path
 
-from drawing import COLOURS, page
+from drawing import COLOURS, INK, page
 from plain import plain_scene
 from quick import QUICK, installed, labelled, parser, pick
 
@@ -60,13 +60,17 @@ COURSES = (
 
 @dataclass(frozen=True)
 class Result:
-    """One run. error: RMS over time of the force, over its peak, against the reference of its equations [-]."""
+    """One run. error: RMS over time of the force, over its peak, against the reference of its equations [-].
+
+    floor: by how much two references differ, likewise [-].
+    """
 
     scene: str
     entrant: str
     setting: float
     seconds: float
     error: float
+    floor: float
     steps: int
     status: str
 
@@ -84,13 +88,14 @@ def timed(method: Method, scene: Scene, setting: float, limit: float) -> Trial:
     return min(trials, key=lambda trial: trial.seconds)
 
 
-def results_of(course: Course, trials: list[Trial], reference: Trial) -> list[Result]:
+def results_of(course: Course, trials: list[Trial], reference: Trial, floor: float) -> list[Result]:
     """Rows of the runs beside the reference."""
     rows = []
     for trial in trials:
         found = errors(trial, reference) if trial.finished else None
         error = float("nan") if found is None else found["force"].rms
-        rows.append(Result(course.name, trial.method, trial.rtol, trial.seconds, error, trial.steps, trial.status))
+        about = trial.rtol, trial.seconds, error, floor, trial.steps, trial.status
+        rows.append(Result(course.name, trial.method, *about))
     return rows
 
 
@@ -105,11 +110,12 @@ def run(course: Course) -> tuple[list[Result], Trial, float]:
                 break
     reference = best_reference(trials, {name: METHODS[name].family for name in ENTRANTS})
     floor = float("nan") if reference.floor is None else reference.floor["force"].rms
-    rows = results_of(course, [trial for trial in trials if trial is not reference.trial], reference.trial)
+    rows = results_of(course, [trial for trial in trials if trial is not reference.trial], reference.trial, floor)
     if scene.bearing.layout.surfaces == 4 and installed("openseespy.opensees", "OpenSees"):
         others = [timed(opensees(steps), scene, steps, course.limit) for steps in STEPS]
-        if others[-1].finished:
-            rows += results_of(course, others[:-1], others[-1])
+        between = errors(others[-2], others[-1]) if all(trial.finished for trial in others[-2:]) else None
+        if between is not None:
+            rows += results_of(course, others[:-1], others[-1], between["force"].rms)
     return rows, reference.trial, floor
 
 
@@ -126,15 +132,21 @@ def write_course(course: Course, reference: Trial) -> None:
     write_columns(folder / "reference.csv", {key: values.tolist() for key, values in columns.items()})
 
 
+def within(rows: list[Result], bound: float) -> str:
+    """A cell of the table."""
+    if any(10 * row.floor > bound for row in rows):
+        return "?"
+    return f"{min(times):.2g} s" if (times := [row.seconds for row in rows if row.error <= bound]) else "-"
+
+
 def table_of(course: Course, rows: list[Result]) -> str:
-    """The least seconds within each bound, by entrant."""
+    """The least seconds within each bound, by entrant; "?" where references are not known to a tenth of it."""
     cells = []
     for name in (*ENTRANTS, OPENSEES):
         own = [row for row in rows if row.entrant == name and row.scene == course.name and row.error == row.error]
         if not own and not any(row.entrant == name and row.scene == course.name for row in rows):
             continue
-        times = [min((row.seconds for row in own if row.error <= bound), default=None) for bound in BOUNDS]
-        cells.append((name, *("-" if each is None else f"{each:.2g} s" for each in times)))
+        cells.append((name, *(within(own, bound) for bound in BOUNDS)))
     return markdown_table(("entrant", *(f"within {bound:g}" for bound in BOUNDS)), cells)
 
 
@@ -143,7 +155,7 @@ def figure(all_rows: list[Result], path: Path) -> None:
     with page(10.0, 8.0, path) as drawn:
         panels = drawn.subplots(2, 2, squeeze=False).ravel()
         for course, axes in zip(COURSES, panels, strict=False):
-            for colour, name in zip(COLOURS * 2, (*ENTRANTS, OPENSEES), strict=False):
+            for colour, name in zip((*COLOURS[: len(ENTRANTS)], INK), (*ENTRANTS, OPENSEES), strict=True):
                 own = [row for row in all_rows if row.entrant == name and row.scene == course.name and row.error > 0]
                 if own:
                     axes.loglog(
@@ -174,7 +186,7 @@ and a converged reference, and what others need for them.
    takes less than one. A run is cut off after {limit:g} s. Tolerances go from 0.1 to 1e-8 in factors of ten, steps of
    methods without error control from 500 in factors of two.
 4. The reference is the tightest run of the pair that agrees best among methods of different families. What they differ by is
-   stated, and an error below it is not known.
+   stated; a bound below ten times this difference has a question mark. The reference of OpenSees is its finest run.
 
 SciPy's methods step in Python and call the compiled equations with their exact Jacobian, so their seconds are what a user
 of SciPy waits for. MuJoCo and Drake are not among the entrants: MuJoCo collides meshes as their convex hulls, so that no

@@ -85,6 +85,7 @@ def largest_flight(peak: float, frequency: float) -> float:
     return float(height[: int(np.argmax(height < -1e-9)) or None].max())
 
 
+LONGER = {"design_by_gradient", "opensees", "stiffness"}  # a page quotes the first; the others set up two models
 # Of every example: expressions of its names, and what they are by other means than the example.
 CHECKS: dict[str, dict[str, Any]] = {
     "own_bearing": {  # the published formula of a double pendulum
@@ -197,7 +198,8 @@ def test_an_example_of_the_gallery_is_short_and_uses_public_names() -> None:
         for names in re.findall(r"^from msfp_gen import (?:\(([^)]*)\)|(.*))$", text, re.MULTILINE):
             assert {name.strip() for name in "".join(names).split(",") if name.strip()} <= set(msfp_gen.__all__)
         lines = [line for line in text.split('"""', 2)[2].splitlines() if line and not line.startswith("#")]
-        assert 5 <= len(lines) <= 85, f"{path.name} has {len(lines)} lines"
+        most = 85 if path.stem in LONGER else 45
+        assert 5 <= len(lines) <= most, f"{path.name} has {len(lines)} lines"
 
 
 def test_the_design_page_shows_the_code_of_its_example() -> None:

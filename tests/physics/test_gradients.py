@@ -292,9 +292,8 @@ def test_works_through_a_rim_contact_with_the_same_steps(
     scene = replace(scene, bearing=scene.bearing.replace(rim_damping=damping, **DAMPED))
     paths, steps = ["rim_stiffness", "rim_damping", "radius"], np.linspace(0.0, 0.3, count + 1)[1:]
     check_frozen(scene, ["bearing.surfaces[0].capacity"], sizes[0], steps=steps)
-    # Steps this small show what Newton's method leaves, at most 1e-10.
     values = check_frozen(
-        scene, [*(f"bearing.surfaces[0].{name}" for name in paths), "motion.scale"], sizes[1], 1.0, steps, 3e-11
+        scene, [*(f"bearing.surfaces[0].{name}" for name in paths), "motion.scale"], sizes[1], 1.0, steps
     )
     gap, force = values["gap"][:, 0], values["rim_force"][:, 0]
     assert np.any((gap < 0) & (force == 0))
