@@ -37,6 +37,7 @@ def built(request, tmp_path_factory) -> tuple[Any, ModelSpec, Path]:
     found = importlib.util.spec_from_file_location(info.module, info.path)
     module = importlib.util.module_from_spec(found)
     found.loader.exec_module(module)
+    sys.modules.pop(info.module, None)  # another model of this layout has the same name
     return module, spec, info.folder
 
 
