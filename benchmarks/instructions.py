@@ -1,7 +1,8 @@
 """Count the instructions of kernels and runs: `python benchmarks/instructions.py`, some minutes, with valgrind installed.
 
 callgrind counts, so the numbers do not depend on the load of the machine. It does not support AVX-512, so the models are
-compiled for AVX2 (level 3 of x86-64). For a run it counts the loop in C (`msfp_run_advance` of the model), for a kernel one call. Rows of docs/performance.md.
+compiled for AVX2 (level 3 of x86-64). For a run it counts the loop in C (`msfp_run_advance` of the model), for a kernel
+one call. A table of docs/performance.md.
 """
 
 from __future__ import annotations
@@ -34,13 +35,13 @@ scene = plain_scene({name!r})
 simulate(replace(scene, effects=Effects(**{effects!r}), solver=replace(scene.solver, rtol={rtol}), output_step=None))
 """
 RUNS = {
-    "`fenz-test2`, 1e-4": ("fenz-test2", {}, 1e-4),
+    "`fenz-test2` at 1e-4": ("fenz-test2", {}, 1e-4),
     "the same, planar and massless, no rims": (
         "fenz-test2",
         {"dimension": "planar", "sliders": "massless", "rims": False},
         1e-4,
     ),
-    "`ridgecrest-clc`, 3e-3": ("ridgecrest-clc", {}, 3e-3),
+    "`ridgecrest-clc` at 3e-3": ("ridgecrest-clc", {}, 3e-3),
 }
 AVX2 = "-UMSFP_X86_64_LEVEL -DMSFP_X86_64_LEVEL=3"
 KERNELS = ("one value of the residual", "one residual with its tangent", "one Newton iteration", "accelerations")
@@ -102,7 +103,7 @@ def main() -> None:
     for text, count, more in zip(KERNELS, few, many, strict=True):
         print(f"| {text}, TFP; (11,5,5) | {count / 1e3:.1f} thousand; {more / 1e3:.1f} ({more / count:.1f} times) |")
     trial, derivative = of_two_port()
-    print(f"| derivative of a two-port over a trial of 10 ms | {derivative / trial:.1f} |")
+    print(f"| derivative of a two-port after a trial of 10 ms | {derivative / trial:.1f} times the trial |")
 
 
 if __name__ == "__main__":

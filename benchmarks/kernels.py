@@ -1,4 +1,4 @@
-"""Time single evaluations of compiled models: `python benchmarks/kernels.py`; each comparison ends with its ratio.
+"""Time single evaluations of compiled models: `python benchmarks/kernels.py`, two tables of docs/performance.md.
 
 It compares a Newton iteration of the default method (residual, tangent, solve) with CasADi's C, if that is installed; the
 accelerations with the articulated-body recursion of the same chain; and iteration and build for few and many bodies.
@@ -18,6 +18,7 @@ from typing import NamedTuple
 import casadi_peer
 import numpy as np
 from quick import installed, parser, pick
+from runs import row
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Surface, Top, build_model, load_scene, simulate
 from msfp_gen.jit.compiler import FLAGS, find_compiler
@@ -172,14 +173,14 @@ def against_casadi(scene: Scene, state: State, ours: float) -> None:
     ]
     moment = np.abs(state.load).max() * state.surfaces[:, 0].max()  # of the terms, which cancel near a solution
     difference = np.abs(residual[: len(expected)] - expected).max() / moment
-    print(
-        f"Newton iteration (residual, tangent, solve), TFP spatial, spin locked: {ours:.0f} ns; CasADi's C and a dense "
-        f"solve {times[0]:.0f} ns, with -O3 -march=native {times[1]:.0f} ns; residuals differ by {difference:.0e} of load times radius; "
-        f"times faster: {times[0] / ours:.1f}",
-        flush=True,
-    )
     if difference > 1e-12:
         raise SystemExit("CasADi computes another residual: the times cannot be compared")
+    row(
+        "one Newton iteration (residual, tangent, solve), TFP: CasADi's C with a dense solve",
+        f"{ours:.0f} ns",
+        f"{times[0]:.0f} ns; {times[1]:.0f} ns with `-O3 -march=native`; residuals differ by {difference:.0e} of load times radius",
+        f"{times[0] / ours:.1f} times faster; {times[1] / ours:.1f}",
+    )
 
 
 def against_the_recursion(ours: float) -> None:
@@ -187,10 +188,11 @@ def against_the_recursion(ours: float) -> None:
     with tempfile.TemporaryDirectory() as folder:
         program = compiled(HERE / "c" / "recursion.c", Path(folder) / "recursion")
         theirs = float(subprocess.run([program], text=True, capture_output=True, check=True).stdout.split()[0])
-    print(
-        f"accelerations, TFP: {ours:.0f} ns; articulated-body recursion of the same chain {theirs:.0f} ns; "
-        f"times slower: {ours / theirs:.1f}",
-        flush=True,
+    row(
+        "accelerations, TFP: articulated-body recursion of the same chain in C, with given moments of the surfaces",
+        f"{ours:.0f} ns",
+        f"{theirs:.0f} ns",
+        f"{ours / theirs:.1f} times slower",
     )
 
 
@@ -199,13 +201,12 @@ def against_depth() -> None:
     small, large = (deep(Layout(*counts)) for counts in ((5, 2, 2), (11, 5, 5)))
     states = [(scene, state_of(scene)) for scene in (small, large)]
     few, many = np.min([[timed(*each)[2] for each in states] for _ in range(ROUNDS)], axis=0)  # in turn
-    print(f"Newton iteration: (5,2,2) {few:.0f} ns, (11,5,5) {many:.0f} ns; ratio: {many / few:.2f}", flush=True)
+    row("one Newton iteration, (11,5,5): (5,2,2)", f"{many:.0f} ns", f"{few:.0f} ns", f"{many / few:.1f} times slower")
     few, many = np.min(
         [[build_seconds(scene.bearing.layout) for scene in (small, large)] for _ in range(pick(3, 1))], axis=0
     )
-    print(
-        f"derive, emit, compile: (5,2,2) {few:.2f} s, (11,5,5) {many:.2f} s of CPU; ratio: {many / few:.2f}", flush=True
-    )
+    text = "derive, emit and compile, CPU time, (11,5,5): (5,2,2)"
+    row(text, f"{many:.2f} s", f"{few:.2f} s", f"{many / few:.2f} times slower")
 
 
 BUILD = """
@@ -230,7 +231,7 @@ def build_seconds(layout: Layout) -> float:
 
 
 def main() -> None:
-    """Print the table, then one line per comparison."""
+    """Print the table of the models, then the comparisons."""
     parser(__doc__).parse_args()
     print("| effects, fenz-test2 | value [ns] | tangent [ns] | Newton iteration [ns] | accelerations [ns] |")
     print("|---|---|---|---|---|")
@@ -241,6 +242,7 @@ def main() -> None:
     scene = replace(load_scene("fenz-test2"), effects=FULL)
     state = state_of(scene)
     ours = timed(scene, state)
+    print("\n| what is compared | msfp-gen | the other | ratio |\n|---|---|---|---|")
     against_casadi(scene, state, ours[2])
     against_the_recursion(ours[3])
     against_depth()

@@ -1,4 +1,4 @@
-"""Compare whole runs with other methods and programs: `python benchmarks/runs.py`; each row ends with its ratio.
+"""Compare whole runs with other methods and programs: `python benchmarks/runs.py`, one table of docs/performance.md.
 
 Effects are fixed: spatial, spin locked, sliders with inertia, rims. Times are CPU seconds of one core, the best of several
 runs. Errors are relative to reference runs that are not timed; the difference of two references shows their accuracy. The
@@ -71,6 +71,11 @@ def cheapest(
     raise SystemExit(f"{method} meets {limit} at none of {tolerances}")
 
 
+def row(what: str, ours: str, theirs: str, ratio: str) -> None:
+    """Print one row of the table."""
+    print(f"| {what} | {ours} | {theirs} | {ratio} |", flush=True)
+
+
 def against_dopri5() -> None:
     """fenz-test2: the method of PEER 2017/07, dopri5 with Newton on all unknowns."""
     scene, step, along = fixed("fenz-test2"), 0.05, slice(0, 1)
@@ -81,11 +86,12 @@ def against_dopri5() -> None:
     )
     check = difference(run.history.top_force[:, along], reference[:, along])[1]
     ours, seconds = cpu(scene, "implicit", rtol), run.counters.wall_time
-    print(
-        f"fenz-test2, largest force error < 1e-3 of the peak: implicit {rtol:g} {1e3 * ours:.2f} ms ({error:.1e}), "
-        f"dopri5 {theirs:g} {seconds:.1f} s, {run.counters.steps} steps ({their_error:.1e}); the references differ by {check:.1e}; "
-        f"times faster: {seconds / ours:.0f}",
-        flush=True,
+    row(
+        "`fenz-test2`, largest force error under 1e-3 of the peak: the method of PEER 2017/07",
+        f"{1e3 * ours:.2f} ms at {rtol:g}, error {error:.1e}",
+        f"`dopri5` {seconds:.1f} s at {theirs:g}, {run.counters.steps:,} steps, error {their_error:.1e}; "
+        f"the references differ by {check:.1e}",
+        f"{seconds / ours:,.0f} times faster",
     )
 
 
@@ -97,8 +103,9 @@ def against_opensees() -> None:
     reference = solved(scene, "implicit", 1e-6, step).history.top_force
     rtol, error, _ = cheapest(scene, "implicit", (1e-2, 3e-3, 1e-3, 3e-4, 1e-4), 2e-3, reference, step, 0, flat)
     ours = cpu(scene, "implicit", rtol)
-    text = f"becker-eight-125, RMS force error < 2e-3: implicit {rtol:g} {1e3 * ours:.2f} ms ({error:.1e})"
-    if not installed("openseespy.opensees", f"OpenSees beside {text}"):
+    what = "`becker-eight-125`, RMS force error under 2e-3 of the peak, each against its own converged run: OpenSees"
+    text = f"{1e3 * ours:.2f} ms at {rtol:g}, error {error:.1e}"
+    if not installed("openseespy.opensees", what):
         return
     limit = run_opensees(scene, pick(64_000, 16_000)).histories["force"][:, 0]
     for steps in (500, 1000, 1500, 2000, 3000, 4000, 8000, 16_000):
@@ -108,13 +115,10 @@ def against_opensees() -> None:
         theirs = difference(force, limit)[0]
         if theirs < 2e-3:
             seconds = min([seconds, *(opensees_seconds(scene, steps) for _ in range(REPEATS // 2))])
-            print(
-                f"{text}, OpenSees {steps} steps {1e3 * seconds:.1f} ms ({theirs:.1e}); "
-                f"times faster: {seconds / ours:.1f}",
-                flush=True,
-            )
+            other = f"`TripleFrictionPendulum` {1e3 * seconds:.1f} ms in {steps} steps, error {theirs:.1e}"
+            row(what, text, other, f"{seconds / ours:.0f} times faster")
             return
-    print(f"{text}, OpenSees not within 2e-3 at 16000 steps; times faster: not measured", flush=True)
+    row(what, text, "not within 2e-3 in 16,000 steps", "-")
 
 
 def opensees_seconds(scene: Scene, steps: int) -> float:
@@ -134,11 +138,12 @@ def against_real_time(explicit: bool) -> None:
     ours, text = cpu(scene, "implicit", rtol), ""
     if explicit:
         ringing = solved(scene, "dopri5", 1e-6, step).history.top_force
-        text = f" and {difference(run.history.top_force, ringing)[0]:.1e} of the explicit one that resolves the ringing"
-    print(
-        f"ridgecrest-clc, 60 s: implicit {rtol:g} {1e3 * ours:.1f} ms, RMS force error {error:.1e} of the peak against "
-        f"the reference without ringing{text}; times real time: {scene.end / ours:.0f}",
-        flush=True,
+        text = f"; {difference(run.history.top_force, ringing)[0]:.1e} against `dopri5`, which resolves the ringing"
+    row(
+        "`ridgecrest-clc`, RMS force error under 5e-3 of the peak: real time",
+        f"{1e3 * ours:.1f} ms at {rtol:g}, error {error:.1e} against the model without ringing{text}",
+        f"{scene.end:.0f} s",
+        f"{scene.end / ours:,.0f} times faster",
     )
 
 
@@ -146,18 +151,20 @@ def planar() -> None:
     """fenz-test2: time saved by a planar model without inertia of the sliders."""
     small = replace(FULL, dimension="planar", sliders="massless", rims=False)
     full, light = (cpu(fixed("fenz-test2", effects), "implicit", 1e-4, 2 * REPEATS + 1) for effects in (FULL, small))
-    print(
-        f"fenz-test2, implicit 1e-4: spatial with inertia {1e3 * full:.2f} ms, planar massless {1e3 * light:.2f} ms; "
-        f"times cheaper: {full / light:.1f}",
-        flush=True,
+    row(
+        "`fenz-test2` at 1e-4: planar without masses, and spatial with them",
+        f"{1e3 * light:.2f} ms",
+        f"{1e3 * full:.2f} ms",
+        f"{full / light:.1f} times faster",
     )
 
 
 def main() -> None:
-    """Print one line per comparison."""
+    """Print one row per comparison."""
     options = parser(__doc__)
     options.add_argument("--all", action="store_true", help="with the explicit reference of the record, some minutes")
     chosen = options.parse_args()
+    print("| what is compared | msfp-gen | the other | ratio |\n|---|---|---|---|")
     with patch("time.perf_counter", time.process_time):  # runs then measure CPU time
         against_real_time(chosen.all)
         planar()

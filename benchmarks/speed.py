@@ -1,4 +1,4 @@
-"""Time builds and runs on this machine, then run the other benchmarks of docs/performance.md: `python benchmarks/speed.py`.
+"""Time builds and runs on this machine: `python benchmarks/speed.py`, two tables of docs/performance.md.
 
 Builds go to a temporary cache. Every run is repeated and its fastest wall time counts.
 """
@@ -10,9 +10,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from pathlib import Path
 
-from quick import OPTIONS, parser, pick
+from quick import parser, pick
 
 LAYOUTS = pick(("5 2 2", "7 3 3", "11 5 5"), ("5 2 2",))
 SCENES = pick(("fenz-test2", "fenz-test5", "becker-eight-125", "ridgecrest-clc", "ridgecrest-ccc"), ("fenz-test2",))
@@ -52,31 +51,28 @@ def warm_build(cache: str) -> float:
 
 
 def main() -> None:
-    """Print both tables, then run the other scripts."""
+    """Print both tables."""
     parser(__doc__).parse_args()
     from plain import plain_scene
 
     from msfp_gen import simulate
 
+    print("| build | wall time [s] |\n|---|---|")
     with tempfile.TemporaryDirectory() as cache:
-        print(f"first build of a cache, which translates the wrapper: {cold_build('2 1 0', cache):.2f} s\n")
-        print("| layout | cold build [s] | over (5 2 2) |\n|---|---|---|")
-        first = 0.0
+        print(f"| (2,1,0), first of a cache: it translates the wrapper too | {cold_build('2 1 0', cache):.2f} |")
         for layout in LAYOUTS:
-            seconds = cold_build(layout, cache)
-            first = first or seconds
-            print(f"| {layout} | {seconds:.2f} | {seconds / first:.2f} |")
-        print(f"\nwarm build_model: {min(warm_build(cache) for _ in range(REPEATS)):.4f} s\n")
-    print("| scene | run [s] | times real time | steps | Newton iterations |\n|---|---|---|---|---|")
+            print(f"| ({layout.replace(' ', ',')}) | {cold_build(layout, cache):.2f} |", flush=True)
+        best = min(warm_build(cache) for _ in range(REPEATS))
+        print(f"| (5,2,2) from the cache, in a new process | {best:.4f} |\n")
+    print("| scene | run [ms] | times real time | steps | Newton iterations |\n|---|---|---|---|---|")
     for name in SCENES:
         runs = [simulate(plain_scene(name)) for _ in range(REPEATS)]
-        best = min(runs, key=lambda run: run.counters.wall_time)
-        count = best.counters
-        speed = best.history.time[-1] / count.wall_time
-        print(f"| {name} | {count.wall_time:.4f} | {speed:.0f} | {count.steps} | {count.newton_iterations} |")
-    for script in ("kernels.py", "runs.py", "batch.py", "instructions.py"):
-        print(flush=True)
-        subprocess.run([sys.executable, str(Path(__file__).with_name(script)), *OPTIONS], check=True)
+        best_run = min(runs, key=lambda run: run.counters.wall_time)
+        count = best_run.counters
+        speed = best_run.history.time[-1] / count.wall_time
+        print(
+            f"| `{name}` | {1e3 * count.wall_time:.1f} | {speed:,.0f} | {count.steps:,} | {count.newton_iterations:,} |"
+        )
 
 
 if __name__ == "__main__":
