@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,7 +35,7 @@ _BUILDERS = {"displacement": "from_arrays", "velocity": "from_velocity", "accele
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Motion:
+class Motion(piecewise.Travelling):
     """Motion of the ground and of the base, twice continuously differentiable except at declared `jumps`.
 
     Attributes:
@@ -83,9 +83,6 @@ class Motion:
 
     def __hash__(self) -> int:
         return hash(self._key())
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.knots, self.coefficients, self.jumps, self.max_step, self.name, self.metadata)
 
     @property
     def duration(self) -> float:

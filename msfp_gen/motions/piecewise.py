@@ -7,8 +7,9 @@ In all functions `knots` is an ndarray, shape (k+1,), [s], increasing. `coeffici
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from math import atan2, factorial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +33,19 @@ class Pieces(NamedTuple):
     coefficients: Array
     max_step: float | None
     metadata: Metadata
+
+
+class Travelling:
+    """A frozen dataclass whose checked fields are copied and pickled alone: without what was derived from them."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {each.name: getattr(self, each.name) for each in fields(self)}  # type: ignore[arg-type]
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        for each in state.values():
+            if isinstance(each, np.ndarray):
+                each.setflags(write=False)
 
 
 # Factor j!/(j - d)! that the d-th derivative produces on the power j, shape (derivative, power).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,7 @@ from msfp_gen.motions.time_grid import Resolution
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Prescribed:
+class Prescribed(piecewise.Travelling):
     """Piecewise polynomials in time; after their end the channels keep the last value.
 
     Attributes:
@@ -66,9 +66,6 @@ class Prescribed:
 
     def _key(self) -> tuple[object, ...]:
         return (self.knots.shape, self.knots.tobytes(), (self.coefficients + 0.0).tobytes(), self.name)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.knots, self.coefficients, self.name)
 
     @property
     def duration(self) -> float:

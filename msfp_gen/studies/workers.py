@@ -10,9 +10,12 @@ from __future__ import annotations
 
 import atexit
 import io
+import mmap
 import os
 import pickle
+import shutil
 import signal
+import tempfile
 import threading
 import time
 from collections import defaultdict
@@ -21,6 +24,7 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future,
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from importlib.util import find_spec
+from pathlib import Path
 from queue import SimpleQueue
 from typing import Any, TypeVar
 
@@ -35,7 +39,9 @@ UNKNOWN = 64  # workers that are assumed of an executor that does not state thei
 START = 1.0  # time that calls in threads wait [s], for all workers together, after which processes are tried
 IDLE = 300.0  # time without a call after which processes end [s]; the next call starts others
 TRIED = 2, 0.1  # calls of each worker, and their processor time [s], by which threads and then processes are measured
-
+WORTH = 1.15  # slowness of threads from which processes are tried: a trial of short runs costs tens of runs
+LARGE = 2**20  # arrays of this size [bytes] come from a process in a file in memory: a pipe copies them six times
+MEMORY = Path("/dev/shm")  # files here are memory, on Linux
 
 Report = Callable[[float, float], None]  # (reached, end)
 _worker = threading.local()  # attributes `stop`: the flag that ends the runs of this thread; `report`: of its call
@@ -169,7 +175,7 @@ class Way:
     """How much longer calls take than their own processor time, in threads or in processes."""
 
     calls: int = 0
-    taken: float = 0.0  # from begin to end [s]
+    taken: float = 0.0  # from when a worker was free to the end [s]
     worked: float = 0.0  # processor time [s]
 
     def add(self, taken: float, worked: float) -> None:
@@ -208,7 +214,7 @@ def local_pool(workers: int | None = None, ways: Ways | None = None) -> Iterator
     count = worker_count(workers)
     idle = _idle[os.getpid(), count]  # threads do not survive a fork
     executor = idle.pop() if idle else Workers(count)
-    executor.ways = ways or Ways()
+    executor.ways, executor.began = ways or Ways(), time.perf_counter()
     try:
         yield Pool(executor, lambda: AHEAD * count, "workers")
     except BaseException:
@@ -237,12 +243,14 @@ class Workers(Executor):
         self._count = count
         self._threads = ThreadPoolExecutor(count, "msfp-gen", self._begin_thread)
         self._processes: Any = None  # executor of loky
-        self._known: set[int] = set()  # processes that have ended a call: their start and first imports are over
+        self._folder: str | None = None  # of the files in memory
+        self._known: set[int] = set()  # processes that have ended a call: their start is over
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._waited = 0.0
         self._suited = count > 1
         self.ways = Ways()
+        self.began = time.perf_counter()  # the block of the pool [s]
 
     def submit(  # type: ignore[override]
         self, function: Callable[..., T], /, *arguments: Any, report: Report | None = None
@@ -256,6 +264,8 @@ class Workers(Executor):
         with self._lock:
             if self._processes is not None:
                 self._processes.shutdown(kill_workers=cancel_futures)
+            if self._folder is not None:
+                shutil.rmtree(self._folder, ignore_errors=True)
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
 
     def _begin_thread(self) -> None:
@@ -263,17 +273,26 @@ class Workers(Executor):
 
     def _call(self, function: Callable[..., T], arguments: tuple[Any, ...], report: Report | None) -> T:
         """The value of a call, in this thread or in a process."""
+        # The wait for the global lock, of this thread and of the thread that submits, begins with the last call's end.
+        begin = max(self.began, getattr(_worker, "ended", 0.0))
+        try:
+            return self._run(function, arguments, report, begin)
+        finally:
+            _worker.ended = time.perf_counter()
+
+    def _run(self, function: Callable[..., T], arguments: tuple[Any, ...], report: Report | None, begin: float) -> T:
+        """The same. begin: since when this thread was free [s]."""
         ways = self.ways
         if self.in_process(ways):
             try:
-                found: T = self._call_process(ways.processes, function, arguments)
+                found: T = self._call_process(ways.processes, function, arguments, begin)
             except _UnsuitedError:
                 self._suited = False
             else:
                 if report is not None:
                     report(1.0, 1.0)
                 return found
-        begin, worked = time.perf_counter(), time.thread_time()
+        worked = time.thread_time()
         _worker.report = report
         value = function(*arguments)
         worked, taken = time.thread_time() - worked, time.perf_counter() - begin
@@ -284,13 +303,12 @@ class Workers(Executor):
 
     def in_process(self, ways: Ways) -> bool:
         """Whether the next call runs in a process."""
-        if not self._suited or self._waited < START:
+        if not self._suited or self._waited < START or not ways.threads.tried(self._count):
             return False
-        threads, processes = (way.tried(self._count) for way in (ways.threads, ways.processes))
-        return ways.processes.slowness < ways.threads.slowness if threads and processes else threads
+        return (ways.processes.slowness if ways.processes.tried(self._count) else WORTH) < ways.threads.slowness
 
-    def _call_process(self, way: Way, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-        """The value of a call in a process. Raises _UnsuitedError."""
+    def _call_process(self, way: Way, function: Callable[..., Any], arguments: tuple[Any, ...], begin: float) -> Any:
+        """The value of a call in a process. begin: since when this thread was free [s]. Raises _UnsuitedError."""
         import cloudpickle
         import loky
 
@@ -302,56 +320,97 @@ class Workers(Executor):
             if self._stop.is_set():
                 raise _StoppedError
             if self._processes is None:
-                begin_process = (_begin_process, (os.getpid(),))
+                self._folder = tempfile.mkdtemp(prefix="msfp-gen-", dir=MEMORY) if os.access(MEMORY, os.W_OK) else None
+                begin_process = (_begin_process, (os.getpid(), self._folder))
                 self._processes = loky.ProcessPoolExecutor(self._count, None, None, IDLE, None, *begin_process)
-        begin = time.perf_counter()
         try:
-            value, worked, process = self._processes.submit(_answer, call).result()
+            value, files, worked, process = self._processes.submit(_answer, call, self._folder).result()
         except (BrokenExecutor, RuntimeError) as error:
             if self._stop.is_set():
                 raise _StoppedError from error
             raise
-        if process in self._known:
-            with self._lock:
+        found = _Unpickler(io.BytesIO(value), arguments, [_mapped(path) for path in files]).load()
+        with self._lock:
+            if len(self._known) >= self._count:  # until then calls wait for processes that start
                 way.add(time.perf_counter() - begin, worked)
-        self._known.add(process)
-        return _Unpickler(io.BytesIO(value), arguments).load()
+            self._known.add(process)
+        return found
 
 
-def _begin_process(parent: int) -> None:
-    """Leave Ctrl-C, which a terminal sends to all processes, to the parent, and end when it has died."""
+def _begin_process(parent: int, folder: str | None) -> None:
+    """Leave Ctrl-C, which a terminal sends to all processes, to the parent, and end when it has died.
+
+    folder: of the files in memory, which goes with it.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
         while os.getppid() == parent:
             time.sleep(1.0)
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
         os._exit(1)
 
     if os.name == "posix":
         threading.Thread(target=watch, daemon=True).start()
 
 
-def _answer(call: bytes) -> tuple[bytes, float, int]:
-    """In a process: the value of a call as bytes, its processor time [s], the process. Raises _UnsuitedError."""
+def _answer(call: bytes, folder: str | None) -> tuple[bytes, list[Path], float, int]:
+    """In a process: the value of a call as bytes and files, its processor time [s], the process.
+
+    folder: of the files. Raises _UnsuitedError.
+    """
     try:
         function, arguments = pickle.loads(call)
     except Exception as error:  # such as a class that cannot be imported here
         raise _UnsuitedError(repr(error)) from None
     begin = time.thread_time()
     value = function(*arguments)
-    worked, stream = time.thread_time() - begin, io.BytesIO()
+    worked = time.thread_time() - begin
     try:
-        _Pickler(stream, arguments).dump(value)
+        return *_packed(value, arguments, folder), worked, os.getpid()
     except Exception as error:
         raise _UnsuitedError(repr(error)) from None
-    return stream.getvalue(), worked, os.getpid()
+
+
+def _packed(value: Any, known: tuple[Any, ...], folder: str | None) -> tuple[bytes, list[Path]]:
+    """A value as bytes, and the files with its large arrays; without a folder, or where it is full, all as bytes."""
+    stream, large = io.BytesIO(), list[pickle.PickleBuffer]()
+
+    def within(array: pickle.PickleBuffer) -> bool:
+        """Whether an array is part of the bytes."""
+        small = folder is None or array.raw().nbytes < LARGE
+        if not small:
+            large.append(array)
+        return small
+
+    _Pickler(stream, known, within).dump(value)
+    files: list[Path] = []
+    try:
+        for array in large:
+            with tempfile.NamedTemporaryFile(dir=folder, delete=False) as file:
+                files.append(Path(file.name))
+                file.write(array.raw())
+    except OSError:
+        for path in files:
+            path.unlink()
+        return _packed(value, known, None)
+    return stream.getvalue(), files
+
+
+def _mapped(path: Path) -> mmap.mmap:
+    """The content of a file in memory, which is gone when the last array in it is."""
+    with path.open("rb") as file:
+        content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)
+    path.unlink()
+    return content
 
 
 class _Pickler(pickle.Pickler):
     """Of what is among `known`, the number travels: a result comes back with the scene of the caller."""
 
-    def __init__(self, stream: io.BytesIO, known: tuple[Any, ...]) -> None:
-        super().__init__(stream, protocol=5)
+    def __init__(self, stream: io.BytesIO, known: tuple[Any, ...], within: Callable[[Any], bool]) -> None:
+        super().__init__(stream, protocol=5, buffer_callback=within)
         self._numbers = {id(each): number for number, each in enumerate(known)}
 
     def persistent_id(self, each: Any) -> int | None:
@@ -362,8 +421,8 @@ class _Pickler(pickle.Pickler):
 class _Unpickler(pickle.Unpickler):
     """As `_Pickler` wrote."""
 
-    def __init__(self, stream: io.BytesIO, known: tuple[Any, ...]) -> None:
-        super().__init__(stream)
+    def __init__(self, stream: io.BytesIO, known: tuple[Any, ...], arrays: list[mmap.mmap]) -> None:
+        super().__init__(stream, buffers=arrays)
         self._objects = known
 
     def persistent_load(self, number: Any) -> Any:

@@ -86,7 +86,9 @@ def test_derivatives_are_those_of_the_displacement(every, kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_starts_at_zero_and_pickles(every, kind):
     motion = every[kind]
+    assert motion.resolution
     copy = pickle.loads(pickle.dumps(motion))
+    assert "resolution" not in vars(copy), "what is derived stays"
     assert copy == motion and hash(copy) == hash(motion) and copy.metadata == motion.metadata
     assert not copy.coefficients.flags.writeable
     assert motion.knots[0] == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
@@ -10,15 +11,16 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from msfp_gen import InputError, RunError, load_scene, simulate_batch
 from msfp_gen.studies import workers as module
-from msfp_gen.studies.workers import Way, Ways, Workers, local_pool
+from msfp_gen.studies.workers import Way, Ways, Workers, end_idle, local_pool
 
 # Calls as text, for `eval` in a process that imports nothing for them.
 PID = "__import__('os').getpid()"
-SPIN = f"(sum(range(400_000)), {PID})[1]"  # some milliseconds with the global lock
+SPIN = f"(sum(x for x in range(600_000)), {PID})[1]"  # tens of milliseconds with the global lock
 FAIL = "1 // 0"
 DIE = f"__import__('os').kill({PID}, 9)"
 THREADS = "__import__('threading')"
@@ -46,6 +48,7 @@ def test_the_faster_way_is_kept() -> None:
     assert workers.in_process(Ways(slow, fast)) and not workers.in_process(Ways(fast, slow))
     assert workers.in_process(Ways(fast, Way())) and workers.in_process(Ways(fast, Way(3, 9.0, 1.0))), "tried first"
     assert not workers.in_process(Ways(Way(3, 9.0, 0.1), Way())), "threads are measured before"
+    assert not workers.in_process(Ways(Way(100, 2.2, 2.0), Way())), "there is too little to gain"
     workers._waited = 0.5 * module.START
     assert not workers.in_process(Ways(slow, fast)), "their start would cost more than they save"
     workers.shutdown()
@@ -55,8 +58,10 @@ def test_the_faster_way_is_kept() -> None:
 def test_calls_that_wait_for_each_other_go_to_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "START", 0.05)
     monkeypatch.setattr(module, "TRIED", (2, 0.0))
-    pids = all_of(eval, [SPIN] * 40, workers=3)
-    assert pids[0] == os.getpid() and len(set(pids) - {os.getpid()}) == 3
+    ways = Ways()
+    pids = all_of(eval, [SPIN] * 60, workers=3, ways=ways)
+    assert pids[0] == os.getpid() and pids[-1] != os.getpid()
+    assert not ways.processes.calls or len(set(pids)) == 4, "measured when all have started"
 
 
 def test_short_work_stays_in_threads() -> None:
@@ -88,6 +93,36 @@ def test_what_cannot_travel_runs_in_threads(monkeypatch: pytest.MonkeyPatch) -> 
     here = threading.Lock()
     assert all_of(lambda lock: (lock is here, os.getpid()), [here] * 4) == [(True, os.getpid())] * 4
     assert all_of(eval, [STUCK] * 4) == [os.getpid()] * 4
+
+
+ROWS = f"__import__('numpy').full(({module.LARGE // 8}, 2), 0.25)"
+
+
+@pytest.mark.skipif(not module.MEMORY.is_dir(), reason="no files in memory")
+def test_large_arrays_come_in_files_in_memory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """They are those of the process, may be changed, and leave no file behind, nor a folder when workers end."""
+    end_idle()
+    monkeypatch.setattr(module, "MEMORY", tmp_path)
+    monkeypatch.setattr(Workers, "in_process", lambda *_: True)
+    mapped: list[Path] = []
+    take = module._mapped
+    monkeypatch.setattr(module, "_mapped", lambda path: (mapped.append(path), take(path))[1])
+    for found in all_of(eval, [ROWS] * 4):
+        assert found.shape == (module.LARGE // 8, 2) and (found == 0.25).all()
+        found[0, 0] = 1.0
+    assert len(mapped) == 4
+    (folder,) = tmp_path.iterdir()
+    assert not list(folder.iterdir())
+    end_idle()
+    assert not folder.exists()
+
+
+def test_large_arrays_come_as_bytes_where_there_is_no_room(tmp_path: Path) -> None:
+    value = {"rows": np.zeros(module.LARGE), "few": np.ones(3)}
+    for folder in (None, str(tmp_path / "gone")):
+        content, files = module._packed(value, (), folder)
+        assert not files and len(content) > 8 * module.LARGE
+        assert module._Unpickler(io.BytesIO(content), (), []).load()["few"].tolist() == [1.0] * 3
 
 
 @pytest.mark.parametrize("processes", [False, True])
