@@ -182,9 +182,14 @@ def snapped(knots: Array, coefficients: Array, times: Array) -> tuple[Array, Arr
 
 
 def _in_vectors(coefficients: Array) -> Array:
-    """Coefficients, shape (k, channels, 6), grouped by vectors of three channels: (k, vectors, components, 6)."""
+    """Coefficients, shape (k, channels, 6), grouped by vectors of three channels: (k, vectors, components, 6).
+
+    Vectors and components that are always zero, which ask for nothing, are left out; one remains.
+    """
     count, channels, _ = coefficients.shape
-    return coefficients.reshape(count, max(channels // 3, 1), -1, ORDER)
+    pieces = coefficients.reshape(count, max(channels // 3, 1), -1, ORDER)
+    used = (pieces != 0).any(axis=(0, 3))
+    return pieces[:, used.any(axis=1)][:, :, used.any(axis=0)] if used.any() else pieces[:, :1, :1]
 
 
 def _sizes(knots: Array, pieces: Array, order: int) -> Array:
