@@ -175,7 +175,7 @@ class BuildingScene(Printed, OtherSystem):
 
     @cached_property
     def grounds(self) -> tuple[list[Motion], list[int]]:
-        """The different motions of the ground, the motion of the scene first, and an index into them for each bearing."""
+        """The different motions of the ground, the motion of the scene first, and the index of one for each bearing."""
         motions, indices = [self.motion], []
         for mount in self.bearings:
             own = self.motion if mount.motion is None else mount.motion
