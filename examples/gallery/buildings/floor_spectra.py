@@ -2,8 +2,8 @@
 ============================
 
 For whoever fastens equipment: response spectra of the ground and of the roof of a two-storey building on four triple
-pendulums. Up to a period of a second the roof has a fraction of the ground's spectral acceleration; at long periods
-both are similar.
+pendulums. Up to a period of a second the roof has a fraction of the ground's spectral acceleration; at long periods the
+bearings reduce nothing.
 """
 
 import matplotlib.pyplot as plt
