@@ -2,7 +2,7 @@
 
 `balances` states the equations of the report at one instant, with their numbers. Newton's method solves them, and two
 integrations use it: the implicit midpoint rule, and the report's method of Dormand and Prince. Bodies do not spin,
-friction is constant, surfaces stay closed. Bodies or surfaces are on the axis before the last, states on those before.
+friction is constant, surfaces stay closed. Bodies or surfaces are on the axis before the last, states on earlier axes.
 """
 
 from dataclasses import replace

@@ -54,7 +54,7 @@ class Audit:
 
     @property
     def tables(self) -> list[Table]:
-        """Verdict, place and number of every check; and what was found, the inconsistent first."""
+        """Verdict, number and time of every check; and what was found, the inconsistent findings first."""
         rows = [
             (one.title, one.verdict.upper() if one.verdict == INCONSISTENT else one.verdict, _number(one), _place(one))
             for one in self.findings

@@ -65,8 +65,8 @@ class Finding:
         verdict: "consistent", "inconsistent" or "not decidable".
         sentence: what was found, or what column would decide.
         value, unit: the number of the finding; None: there is none.
-        time: its place [s]; None: the whole record.
-        drawing: its evidence.
+        time: instant of the finding [s]; None: the whole record.
+        drawing: the evidence as a figure; None: there is none.
     """
 
     check: str

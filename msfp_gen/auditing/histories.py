@@ -43,7 +43,7 @@ class Histories:
         name: of the file or run, for tables and pages.
         columns: by the names of `QUANTITIES`, ndarray, shape (T,) each, [SI]; `time` is one of them.
         mass: supported by all bearings together, as the source states it [kg]; None: it is not stated.
-        bearings: number of bearings that share it alike.
+        bearings: number of bearings that share the mass equally.
 
     Raises:
         InputError: fewer than 20 rows, numbers that are not finite, or times that do not increase.
@@ -82,7 +82,7 @@ class Histories:
         return self.columns["time"]
 
     def missing(self, *names: str) -> list[str]:
-        """Names without a column; `force` and `displacement` stand for one axis at least."""
+        """The names that have no column; a vector such as `force` needs a column of one horizontal axis at least."""
         return [name for name in names if name not in self.columns and f"{name}_1" not in self.columns and
                 f"{name}_2" not in self.columns]  # fmt: skip
 
@@ -119,7 +119,7 @@ class Histories:
 
     @property
     def step(self) -> float:
-        """Median distance of two rows [s]."""
+        """Median time between two rows [s]."""
         return float(np.median(np.diff(self.time)))
 
     def scaled(self, factors: Mapping[str, float]) -> Histories:

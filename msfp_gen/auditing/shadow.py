@@ -86,9 +86,9 @@ class Shadow:
         data: the recorded histories, with signs and units put right.
         stated: the data of the bearing.
         result: the run of the full model, which carries a fiftieth of the axial force at rest at least.
-        opened: the run in which surfaces part, and the upper plate has the mass that the axial force at rest carries;
-            None where the recorded axial force always presses.
-        error: of its force, RMS over the largest force: of the steps of the run and of the rows of the record [-].
+        opened: the run in which surfaces separate, and the upper plate has the mass that gives the axial force at rest;
+            None where the recorded axial force is always compression.
+        error: of the force of the run, RMS over the largest force, by its steps and by the rows of the record [-].
         left_out: the effects of the model, tried one after the other.
         notes: what was changed in the record.
     """
@@ -124,7 +124,7 @@ class Shadow:
 
     @cached_property
     def differences(self) -> tuple[Difference, ...]:
-        """The recorded histories against the computed ones: the force, and what surfaces did."""
+        """The recorded histories against the computed ones: the force, and the histories of the surfaces."""
         return tuple(self._difference(*key, *pair) for key, pair in self.histories.items())
 
     def _difference(self, quantity: str, surface: int, recorded: Array, own: Array) -> Difference:
@@ -148,7 +148,7 @@ class Shadow:
 
     @property
     def lift_off(self) -> str:
-        """When, how long and how far surfaces part in the model; "" where the recorded axial force always presses."""
+        """When, how long and how far surfaces separate in the model; "" where the axial force is always compression."""
         if self.opened is None:
             return ""
         low = opens(self.data)
@@ -255,10 +255,10 @@ class Shadow:
 
 
 def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | None = None) -> Shadow:
-    """Drive the full model of a bearing by the recorded motion and axial force, and compare what it does.
+    """Drive the full model of a bearing by the recorded motion and axial force, and compare its force and surfaces.
 
     Both plates move as recorded where there are columns of them, else the ends move by the displacement across the
-    bearing. Where the axial force is nearly zero or tension, surfaces part.
+    bearing. Where the axial force is nearly zero or tension, surfaces separate.
 
     Args: see `audit`.
 

@@ -207,7 +207,7 @@ class Building(Printed):
 
     @cached_property
     def oscillators(self) -> Oscillators:
-        """Its attachments and an oscillator on them for each mode. Raises InputError, as `fixed`."""
+        """The attachments of the bearings, and an oscillator on them for each mode. Raises InputError, as `fixed`."""
         return Oscillators.of(self.fixed, self.mass, self.damping, self.stiffness)
 
     @property

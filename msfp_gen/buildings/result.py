@@ -144,7 +144,7 @@ class BuildingResult(AnyResult):
 
     @property
     def overturning_moment(self) -> Array:
-        """Moment that accelerates the building about E1 and E2, as in `overturning` in extremes.py, (k, 2) [N m]."""
+        """Moment along E1 and E2 that accelerates the building, about its mass centre at height 0, (k, 2) [N m]."""
         moment: Array = self.acceleration @ overturning(self.scene).T
         return moment
 
@@ -257,7 +257,7 @@ class BuildingResult(AnyResult):
         return summaries.summarise(self)
 
     def entry(self, key: str) -> Any:
-        """The entry of the summary at a key, or the `floor_spectra` of the row of a suite; None where there is none."""
+        """One entry of the summary by its key, or `floor_spectra` for the row of a suite; None where there is none."""
         return kept_spectra(self) if key == "floor_spectra" else super().entry(key)
 
     @property
@@ -350,7 +350,7 @@ class BuildingResult(AnyResult):
         return summaries.tables(self.summary)
 
     def over_steps(self, word: str, field: str) -> None:
-        """Nothing: studies take extremes of columns over the rows of a building."""
+        """None: studies take extremes of columns over the rows of a building."""
 
     @property
     def figures(self) -> Mapping[str, Any]:

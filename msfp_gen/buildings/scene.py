@@ -47,11 +47,11 @@ REST = 1e-9  # largest velocity of the ground at the start [m/s]
 class BuildingBearing:
     """A bearing of a building.
 
-    bearing: values, which several bearings of a building may share. interface: `Top.node(...)`, stiffness and damping
-    between top plate and building. position: in plan [m]; None: of the node, of a floor its centre of mass. node: of
-    the building; a rigid link connects the bearing to it. effects: of the model; `Auto` or None: selected from the
-    scene. name: for messages and results. motion: of the ground below the bearing; None: of the scene. Raises
-    InputError.
+    bearing: values, which several bearings of a building may share. interface: `Top.node(...)`, the joint: stiffness
+    and damping between top plate and building. position: in plan [m]; None: the position of the node, for a floor its
+    centre of mass. node: of the building; a rigid link connects the bearing to it. effects: of the model; `Auto` or
+    None: selected from the scene. name: for messages and results. motion: of the ground below the bearing; None: of the
+    scene. Raises InputError.
     """
 
     bearing: Bearing
@@ -175,7 +175,7 @@ class BuildingScene(Printed, OtherSystem):
 
     @cached_property
     def grounds(self) -> tuple[list[Motion], list[int]]:
-        """The different motions of the ground, the motion of the scene first; and for each bearing the index of its."""
+        """The different motions of the ground, the motion of the scene first, and the index of one for each bearing."""
         motions, indices = [self.motion], []
         for mount in self.bearings:
             own = self.motion if mount.motion is None else mount.motion
@@ -394,7 +394,7 @@ class BuildingScene(Printed, OtherSystem):
         return self.modelled
 
     def with_effects(self, **changes: Any) -> Self:
-        """The scene with values of `Effects` given for every bearing, without numbers of lost friction laws."""
+        """The scene with other values of `Effects` for every bearing, without numbers of laws that are then unused."""
         bearings = [
             replace(
                 mount,
@@ -406,7 +406,7 @@ class BuildingScene(Printed, OtherSystem):
         return replace(self, bearings=bearings)
 
     def with_all_effects(self) -> Self:
-        """The scene with every effect that monitors may add to its bearings; those with given effects stay."""
+        """The scene with every effect that monitors may add; bearings whose effects are given stay as they are."""
         bearings = []
         for mount, effects in zip(self.bearings, self.modelled, strict=True):
             requested = EffectRequest(Auto() if mount.effects is None else mount.effects, self.solver, self.end)

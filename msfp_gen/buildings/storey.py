@@ -201,7 +201,7 @@ REFUSED = {
 
 @dataclass(frozen=True)
 class Soil:
-    """Springs and dampers of the ground below one bearing, along E1 and E2, and along E3.
+    """Springs and dampers of the soil below one bearing, along E1 and E2, and along E3.
 
     stiffness, vertical_stiffness [N/m]; damping, vertical_damping [N s/m]. rotational_stiffness [N m/rad] and mass of a
     foundation [kg] are not modelled: giving them raises InputError, which says why.

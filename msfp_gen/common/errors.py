@@ -30,7 +30,7 @@ class InputError(MsfpError, ValueError):
 
 
 class CompileError(MsfpError, RuntimeError):
-    """There is no compiler, or it failed: `command`, path of the `log`, and the last lines of its `output`."""
+    """There is no compiler, or it failed. The error has `command`, the path of the `log` and the end of `output`."""
 
     exit_code = 2
 

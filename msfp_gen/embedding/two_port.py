@@ -106,7 +106,7 @@ _FAILURES = {status.name: status for status in STATUSES}
 
 
 class TwoPort:
-    """A bearing between two moving ends: motions in, wrenches out.
+    """A bearing between two moving ends: it takes the motions of both ends and gives the wrenches on them.
 
     The lower end holds the base. The upper end holds the far side of the interface, the springs and dampers of
     `Top.node` on the top plate; it is at r_nn at the start. `trial` integrates the bearing from the committed state,
@@ -126,7 +126,7 @@ class TwoPort:
         `Effects` of the model, spatial with locked spin; `top_rotation` is added. None: the default ones, with the
         friction law whose parameters the surfaces have.
     solver
-        Tolerances and steps; a method of implicit kind. `first_step` is the first one after the start, `max_steps` the
+        Tolerances and steps; an implicit method. `first_step` is the first step after the start, `max_steps` the
         limit of one trial.
 
     Raises
@@ -163,12 +163,12 @@ class TwoPort:
 
     @classmethod
     def of_scene(cls, scene: Scene) -> Self:
-        """The two-port of a scene with a rig: it keeps the springs, dampers and axial load; the far ends of the springs
+        """The two-port of a scene with a rig, with its springs, dampers and axial load; the far ends of the springs
         move.
 
-        The motion and the duration of the scene are not used. `Auto` effects suit a motion that nobody knows: spatial,
+        The motion and the duration of the scene are not used. `Auto` effects suit any motion of the ends: spatial,
         inertial sliders, with rims. Raises InputError as the class, and where the top is no rig with horizontal,
-        vertical and rotational stiffness, or the scene has parts that a two-port has not.
+        vertical and rotational stiffness, or the scene has parts that a two-port does not have.
         """
         require_type(scene, Scene, "scene")
         return cls(scene.bearing, *parts_of_rig(scene), scene.solver)

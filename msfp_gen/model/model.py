@@ -383,9 +383,8 @@ class Model:
         """Jacobian of `residual`, ndarray, shape (unknowns, k).
 
         wrt: "unknowns" (their order); "state" (k = 8(n-1), with uplift 14(n-1): q, v, h, each flattened, of a planar
-        model in its plane); "inputs" (k = 24: base
-        displacement, velocity, acceleration; psi_1, theta_1, phi_1, rates, accelerations; top force; top moment).
-        Other inputs and errors as in `residual`.
+        model in its plane); "inputs" (k = 24: base displacement, velocity, acceleration; psi_1, theta_1, phi_1, rates,
+        accelerations; top force; top moment). Other inputs and errors as in `residual`.
         """
         variables = columns(wrt, self.layout.surfaces, self.effects)
         state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
@@ -402,10 +401,10 @@ class Model:
         q, v, a: angles of bodies 2..n, rates and accelerations, shape (n-1, 3) [rad], [rad/s], [rad/s^2], with uplift
         (n-1, 6), separations last [m], [m/s], [m/s^2]. base: shape (3, 6): u_g1, u_g2, u_g3 [m], psi_1, theta_1, phi_1
         [rad], and their first and second derivatives; None: zero.
-        Returns {"r_01", "r_1", "r_11", "r_1c", "r_12", ...} [m], rates of names with v for r [m/s] and
-        with a [m/s^2], "omega_k" and "omega'_k" [rad/s], "alpha_k" and "alpha'_k" [rad/s^2], "t_k" (3, 3): rows t_1,
-        t_2, t_3. In stacks of ten and more bodies pairs have a stroke, "r_1_2", since "r_12" is the centre of body 12.
-        Components along E1, E2, E3. Raises InputError for wrong shapes and planar models.
+        Returns {"r_01", "r_1", "r_11", "r_1c", "r_12", ...} [m], rates of names with v for r [m/s] and with a [m/s^2],
+        "omega_k" and "omega'_k" [rad/s], "alpha_k" and "alpha'_k" [rad/s^2], "t_k" (3, 3): rows t_1, t_2, t_3. In
+        stacks of ten and more bodies an underscore separates the numbers of a pair, "r_1_2", since "r_12" is the centre
+        of body 12. Components along E1, E2, E3. Raises InputError for wrong shapes and planar models.
         """
         if self.planar:
             raise InputError("kinematics: not available for a planar model; build it with dimension = 'spatial'")

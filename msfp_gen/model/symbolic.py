@@ -90,7 +90,7 @@ class SymbolicModel:
         return self.residual.jacobian(getattr(self, wrt))
 
     def values(self, bearing: Bearing, top: Top | None = None) -> Array:
-        """The values of `parameters` of a bearing and a top, None: without springs and mass; shape (parameters,) [SI].
+        """The values of `parameters` for a bearing and a top (None: no springs, no mass), shape (parameters,) [SI].
 
         Raises InputError where the bearing does not belong to this model, and for a top on a vertical spring, which
         these equations do not have.

@@ -30,7 +30,7 @@ def temperature_at_depth(result: Result, depth: float) -> Array:
 
     depth: below the sliding surface, inside the heated plate [m]. The result follows from the temperature of the
     surface in the rows, which is taken as linear between them. Source: Carslaw and Jaeger, Conduction of Heat in Solids
-    (1959). Raises InputError where the run has no temperatures, or where a plate is thinner.
+    (1959). Raises InputError where the run has no temperatures, or where a plate is thinner than the depth.
     """
     if not 0 <= depth < inf:
         raise InputError(f"depth = {depth}: a distance below the sliding surface [m]; give 0 or more")

@@ -125,7 +125,7 @@ class AnyResult(Printed):
         """Main results in SI units, as values that JSON can hold."""
 
     def entry(self, key: str) -> Any:
-        """The entry of the summary at a key, without those that it does not need; None where there is none."""
+        """One entry of the summary by its key, without computing the others; None where there is none."""
         return self.summary.get(key)
 
     @property
@@ -228,7 +228,7 @@ class Mounting:
 
 
 class Alone(NamedTuple):
-    """What the run of one bearing alone has and a bearing below a building does not have."""
+    """What a run of one bearing alone has, and a bearing below a building does not have: scene, rows and counters."""
 
     scene: Scene
     history: History
@@ -257,17 +257,17 @@ class Result(AnyResult):
     """The result of `simulate`, or one bearing of the result of a building.
 
     A RunError has one in `.result` if the run failed after its start. History and notes are made of the recorded rows
-    when they are asked for first.
+    when they are first asked for.
 
-    history: rows, a `History`; below a building the `BearingRows` that its rows have of a bearing, with the
-    displacement across bearing and interface, base_displacement of the ground below it, and top_moment about its upper
-    end. events: located by the run; none below a building. status: "ok", "stopped" (the stop condition of the scene was
+    history: rows, a `History`; below a building `BearingRows`, which have fewer fields: their displacement is across
+    bearing and interface, base_displacement is of the ground below the bearing, and top_moment is about its upper end.
+    events: located by the run; none below a building. status: "ok", "stopped" (the stop condition of the scene was
     met) or the name of a failure; message: one line of text, "" for a run that succeeded. counters: the work of the
     solver; None below a building, whose solver steps all bearings at once. provenance: versions, model keys and solver
     options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
-    recorded_extremes: of all accepted steps; None where only the rows are known. gradients: derivatives with respect to
-    parameters; None: not computed. mounting: None for a bearing alone; below a building, whose scene is `scene`, what
-    its scene says about the bearing.
+    recorded_extremes: over all accepted steps; None where only the rows are known. gradients: derivatives with respect
+    to parameters; None: not computed. mounting: None for a bearing alone; below a building, what the scene of the
+    building says about the bearing.
     """
 
     source: ClassVar[str] = "msfp-gen"
@@ -291,7 +291,7 @@ class Result(AnyResult):
 
     @property
     def alone(self) -> Alone:
-        """Scene, rows and counters of a bearing that was run alone. Raises InputError below a building."""
+        """Scene, rows and counters of a bearing that was run alone. Raises InputError for a bearing of a building."""
         history, counters = self.history, self.counters
         if self.mounting is None and isinstance(history, History) and counters is not None:
             return Alone(cast("Scene", self.scene), history, counters)
@@ -334,7 +334,7 @@ class Result(AnyResult):
 
     @property
     def one_pendulum(self) -> bool:
-        """Whether its surfaces make one pendulum in place of the stack (docs/studies.md)."""
+        """Whether the run has one equivalent pendulum in place of the stack (docs/studies.md)."""
         return self.scene.fidelity == "equivalent"
 
     @property
@@ -359,7 +359,7 @@ class Result(AnyResult):
 
     @cached_property
     def extremes(self) -> Extremes:
-        """Extremes over all accepted steps, and rows of a bearing alone."""
+        """Extremes over all accepted steps; of a bearing alone over its rows too."""
         recorded = self.recorded_extremes
         if recorded is not None and self.mounting is not None:
             return recorded
@@ -396,7 +396,7 @@ class Result(AnyResult):
         return summary_of_bearing(self)
 
     def entry(self, key: str) -> Any:
-        """The entry of the summary at a key, without those that it does not need; None where there is none."""
+        """One entry of the summary by its key, without computing the others; None where there is none."""
         if key == "verdict":
             return self.verdict.as_dict
         return self.of_bearing[key] if key in self.of_bearing else super().entry(key)
@@ -416,7 +416,7 @@ class Result(AnyResult):
         return work_rows(self.summary) if self.mounting is None else []
 
     def part_tables(self) -> list[Table]:
-        """Tables of the surfaces, and of the transitions of a monotonic run; none of one pendulum in their place."""
+        """Tables of the surfaces, and of the transitions of a monotonic run; none of one equivalent pendulum."""
         if self.one_pendulum:
             return []
         changes = self.summary.get("transitions")
@@ -426,8 +426,8 @@ class Result(AnyResult):
     def characterise(self) -> Characterisation:
         """Effective stiffness, damping, sliding regimes, remaining capacity, velocity and heat (docs/results.md).
 
-        What the rows of a bearing of a building do not have is None, and the notes say so. Raises InputError where the
-        bearing did not move.
+        A quantity that the rows of a bearing of a building do not give is None, and the notes say so. Raises InputError
+        where the bearing did not move.
         """
         return characterise_bearing(self)
 

@@ -38,7 +38,7 @@ class Surface:
     friction: friction coefficient mu. yield_displacement: d_y of the Bouc-Wen equations [m]; R_gamma/R_0 of (2.94),
     with its values in SI, is 1/d_y. rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103).
     seat_stiffness [N/m], seat_damping [s/m]: k and c of the unilateral contact of models with uplift, whose force is
-    k (s + c abs(s) ds/dt) at compression s (docs/uplift.md); k = None: `standing.seat_stiffness`. contact_damping: T
+    k (s + c abs(s) ds/dt) at compression s (docs/uplift.md); k = None: chosen from the top. contact_damping: T
     [s]; friction is mu N (Y + T dY/dt) in place of mu N Y (docs/friction.md). The remaining fields are parameters of
     friction laws (docs/friction.md) and of drilling moments: each is given if, and only if, the law of
     `Effects.friction` or the moment of `Effects.spin` has it. Raises InputError.
@@ -116,11 +116,11 @@ _SURFACE_ARRAYS = tuple(  # the stiffness of unilateral contacts depends on the 
 class Bearing(Printed):
     """A stack of bodies with `layout`: n - 1 surfaces, and the bodies 2..n above the base (body 1), bottom first.
 
-    base_height: l_1 [m]. gravity: g, by default of PEER 2017/07; the unit g of texts is 9.80665 [m/s^2].
+    base_height: l_1 [m]. gravity: g [m/s^2], by default 9.8 as in PEER 2017/07; the unit g of texts is 9.80665 m/s^2.
     base_rim_radius, base_rim_offset: r_1, p_1, used where the first surface is concave down [m].
     base_centroid: z_1, which only defines the named point r_1 (3.2); None: half the height [m].
     friction_lower, friction_upper: coefficients of the surfaces at the bounds of a bounding analysis, bottom first;
-    None: it needs factors.
+    None: the analysis needs factors.
     friction_at: "pivot" where the coefficients of `surfaces`, and their bounds, come from a data sheet; the bearing
     keeps the coefficients at the surfaces (`friction_from_pivot`).
     Raises InputError: a wrong number of entries, a value out of range, or a geometry that cannot be built.

@@ -41,11 +41,11 @@ class Scene(Printed, SceneFields):
     """The complete input of `simulate`.
 
     bearing, motion (of the base), top, solver: see their classes. duration [s]; None: the duration of the motion.
-    initial_state; None: centred and at rest. output_step: distance of rows [s]; None: the steps of the solver.
+    initial_state; None: centred and at rest. output_step: time between rows [s]; None: the steps of the solver.
     stop: condition that ends the run early. load: load history on the top plate, in addition to the load of the top.
     top_rotation: rotation history of the support to which the rotational springs of the top are fixed. effects: the
-    effects that are modelled, or `Auto`: selected from the scene. limits: of the device, for the verdict of the
-    run; None: `Limits()`. fidelity: the level at which `at_fidelity` made it, for its notes. motion_table:
+    effects that are modelled, or `Auto`: selected from the scene. limits: of the bearing, for the verdict of the
+    run; None: `Limits()`. fidelity: the level of simplification of the scene, for the notes of the run. motion_table:
     the `[motion]` table of a scene file, from which the scene can be written back. Raises InputError: a part of the
     wrong type, or inconsistent parts.
     """
@@ -122,7 +122,7 @@ class Scene(Printed, SceneFields):
         return select_effects(self)
 
     def with_bearings(self, change: Callable[[Bearing, Law | None], Bearing]) -> Self:
-        """The scene with its bearing changed. change: of a bearing and its friction law at the start."""
+        """The scene with its bearing changed. change: gives another bearing for a bearing and its law at the start."""
         return replace(self, bearing=change(self.bearing, self.law[1]))
 
     @property
@@ -131,7 +131,7 @@ class Scene(Printed, SceneFields):
         return (self.modelled,)
 
     def with_effects(self, **changes: Any) -> Self:
-        """The scene with values of `Effects` given, without numbers of a friction law that it loses."""
+        """The scene with other values of `Effects`, without the numbers of a friction law that is then unused."""
         effects = replace(self.effects, **changes)
         return replace(self, effects=effects, bearing=bearing_for(self.bearing, changes.get("friction")))
 
@@ -140,7 +140,7 @@ class Scene(Printed, SceneFields):
         return self if isinstance(self.effects, Effects) else replace(self, effects=all_effects(self))
 
     def with_effects_for(self, error: float) -> tuple[Self, str]:
-        """The scene with effects selected for half of an error [-], and why; the other half is for the method."""
+        """The scene with effects selected for half of an error [-], and the reasons; the method has the other half."""
         effects = self.effects
         if isinstance(effects, Effects):
             return self, f"effects as the scene has them: {effects.dimension}, {effects.sliders} sliders"
@@ -154,7 +154,7 @@ class Scene(Printed, SceneFields):
         return (load_at_rest(self),)
 
     def beginning_like(self, others: Sequence[Self]) -> Self:
-        """The scene itself: a run takes in the effects that it needs, which `with_effects_of` gives to all."""
+        """The scene itself: a run adds the effects that it needs, and `with_effects_of` gives them to all scenes."""
         return self
 
     def with_effects_of(self, models: Sequence[str]) -> Self | None:

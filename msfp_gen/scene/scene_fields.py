@@ -31,12 +31,12 @@ _FORCE, _LENGTH, _TIME = Quantity("N", above=0.0), Quantity("m", above=0.0), Qua
 class Limits:
     """Limits of a bearing, in a building of each bearing. No number of a run depends on them, only its verdict.
 
-    rim_force: of a rim [N]; None: a third of the axial load at rest, of the largest normal force where the load varies.
+    rim_force: of a rim [N]; None: a third of the axial load at rest, or of the largest normal force if the load varies.
     rim_compression: of a rim [m]; None: a tenth of the capacity of its surface. uplift_height: clearance between the
     faces of a surface [m]; None: the height at which its rim acts, the rim_offset of its slider. uplift_duration:
     longest time for which a surface is open [s]. temperature: at the centre of a surface [degC]. axial_load: largest
-    vertical force on what is carried [N]; None: none. displacement: largest horizontal one across the bearing [m];
-    None: none. Raises InputError.
+    vertical force on the structure [N]; None: no limit. displacement: largest horizontal displacement [m]; None: no
+    limit. Raises InputError.
     """
 
     rim_force: Annotated[float | None, _FORCE] = None

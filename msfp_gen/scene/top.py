@@ -87,7 +87,7 @@ class RigTop(Top):
 
     axial_load: downward [N]. stiffness, damping: k_top, c_top along E1 and E2 [N/m], [N s/m].
     rotational_stiffness, rotational_damping: against tilt and spin [N m/rad], [N m s/rad]. vertical_stiffness,
-    vertical_damping: of a rig that holds its height, beside the axial load, without force at the height of the
+    vertical_damping: of a rig that holds its height, in addition to the axial load, without force at the height of the
     start [N/m], [N s/m]; 0: the load alone. Raises InputError.
     """
 
@@ -114,9 +114,9 @@ class PrescribedTop(Top):
 class MassTop(Top):
     """A rigid supported mass fixed to the top plate, or resting on it through a vertical spring.
 
-    mass [kg]. inertia: (transverse, axial) about its centre of mass, or one value for both [kg m^2].
-    height: of its centre of mass above the top of the top plate, r_nn [m].
-    rotational_stiffness, rotational_damping: restraint against tilt, such as by the remaining structure
+    mass [kg]. inertia: (transverse, axial) about the centre of mass, or one value for both [kg m^2].
+    height: of the centre of mass above the upper face of the top plate, r_nn [m].
+    rotational_stiffness, rotational_damping: restraint against tilt, for example by the remaining structure
     [N m/rad], [N m s/rad]. vertical_stiffness, vertical_damping: between top plate and mass, of bearing and columns, k
     and c of docs/model.md [N/m], [N s/m]; None or 0: rigid. At the start the spring carries the weight at rest. Raises
     InputError.

@@ -76,12 +76,12 @@ def simulate(  # noqa: D417 - the docstring lists the options one by one
     gradients
         Paths of parameters (`bearing.surfaces[*].friction`) by which the run is differentiated: docs/gradients.md.
     energy_gradients
-        Whether the energies that are integrals over the run are differentiated too, at up to four fifths more cost.
+        Whether the energies that are integrals over the run are differentiated too, which costs more.
     gradient_errors
         Whether the errors of the derivatives of a run that meets a rim or lifts off are measured, by another run at a
         tenth of its tolerance.
     threads
-        For the bearings of a building; None: chosen. Results do not depend on their number.
+        Number of threads for the bearings of a building; None: chosen. Results do not depend on it.
 
     Returns
     -------
@@ -92,8 +92,8 @@ def simulate(  # noqa: D417 - the docstring lists the options one by one
     ------
     InputError
         The method does not support the effects; the rows do not fit into memory; the checkpoint is damaged, or
-        of another scene or build; a parameter does not exist, or the run has no gradients; an option is none of this
-        scene.
+        of another scene or build; a parameter does not exist, or the run has no gradients; the runs of this kind of
+        scene have no such option.
     RunError
         The run failed: the message gives time, bearing, surface and cause, `.result` has the rows until then.
 

@@ -92,7 +92,7 @@ def study(
         executor: an executor (`concurrent.futures`) to run on, such as one of mpi4py or Parsl; it stays open.
         dask: address or scheduler file of a Dask cluster to run on.
         shard: (i, n): only every n-th chunk, from the i-th; for job arrays that share `output`.
-        force: whether it also runs with values of the first or the last run that no unit can make right.
+        force: whether to run also with values of the first or the last run that are implausible in any unit.
         progress: called with the number of runs done, by earlier calls too, and the number of runs of the shard.
 
     Raises InputError before any run: invalid input, or a folder with another study; RunError: workers died, or more

@@ -1,8 +1,8 @@
 """The five sliding regimes of a triple pendulum
 =============================================
 
-For whoever wants to see why a triple pendulum is soft in small earthquakes and stiff in large ones: it is pushed slowly
-until its outer sliders are at their rims, and its surfaces take turns.
+For whoever wants to see how the stiffness of a triple pendulum changes with the displacement: it is pushed slowly
+until its outer sliders are at their rims, and different surfaces slide one after the other.
 """
 
 import matplotlib.pyplot as plt
@@ -23,8 +23,8 @@ result = simulate(
 )
 
 # %%
-# The run knows which surfaces slide (1 is the lowest). A regime ends where the next one begins; the stiffness over the
-# load is the inverse of a length.
+# The characterisation of the run has the surfaces that slide in each regime (1 is the lowest). A regime ends where the
+# next one begins; the load over the stiffness is a length.
 
 stages = result.characterise().first_loading.stages
 ends = [0.0, *(stage.start for stage in stages[1:]), stages[-1].end]
@@ -33,7 +33,8 @@ for name, stage, end in zip(["I", "II", "III", "IV", "V"], stages, ends[1:], str
     print(f"{name:4} surfaces {stage.surfaces} to {1e3 * end:3.0f} mm, stiffness = load / {length:.2f} m")
 
 # %%
-# Inner surfaces, then one outer surface after the other, and back at the rims: I to V.
+# First the inner surfaces slide (I), then one outer surface after the other (II, III); at the rims of the outer
+# surfaces the inner ones slide again (IV, V).
 
 data = result.dataset.sel(axis="E1")
 u, ratio = data["displacement"].values, data["top_force"].values / result.axial_load

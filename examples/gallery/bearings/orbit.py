@@ -1,8 +1,9 @@
 """A circular orbit
 ================
 
-For whoever takes loops of tests along one axis into two directions: on a circle friction acts along the velocity,
-across the displacement, and only the pendulum pulls back. The loop along one axis becomes an ellipse.
+For whoever applies loops of tests along one axis to motion in two directions: on a circle friction acts along the
+velocity, across the displacement, and only the curvature of the dish restores. The loop along one axis becomes an
+ellipse.
 """
 
 import matplotlib.pyplot as plt

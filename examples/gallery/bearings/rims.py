@@ -1,8 +1,8 @@
 """Sliders that meet their rims
 ============================
 
-For whoever sizes the dishes: one record, stronger from run to run, on a triple pendulum. Force grows with displacement
-as the radii have it, until sliders meet the rims of their dishes, and then several times as fast.
+For whoever sizes the dishes: one record, stronger from run to run, on a triple pendulum. The force grows with the
+displacement as the radii determine, until sliders meet the rims of their dishes, and then several times as fast.
 """
 
 import matplotlib.pyplot as plt
@@ -24,7 +24,7 @@ for factor, u, f, run in zip(factors, displacement, force, runs, strict=True):
     print(f"record x {factor:.1f}: {1e3 * u:3.0f} mm, {f:.2f} of the load, rims {run.summary['rims_met']}")
 
 # %%
-# Each dot is an earthquake.
+# Each dot is one run.
 
 figure, axes = plt.subplots()
 axes.plot(1e3 * displacement, force, color="gray")

@@ -2,7 +2,7 @@
 ========================
 
 For whoever has vertical motion near 1 g: a mass on a triple pendulum is shaken sideways and, a little beyond 1 g,
-vertically. Its surfaces open, carry nothing, and land.
+vertically. Its surfaces separate, transmit no force while they are open, and land.
 """
 
 import matplotlib.pyplot as plt
@@ -21,7 +21,7 @@ effects = Effects(dimension="planar", uplift=True)
 result = simulate(Scene(presets.bearing("prototype-tfp"), Motion.from_arrays(time, path), mass, effects=effects))
 
 # %%
-# How far the top plate leaves its base, and with what force it lands. Steel and liners are all that yields here: a
+# How far the top plate rises above its base, and with what force it lands. Only steel and liners are compliant here: a
 # column or a footing below them lowers the force of a landing.
 
 data = result.dataset
@@ -32,7 +32,7 @@ print(f"rise of the top plate above its base {1e3 * rise.max():.1f} mm")
 print(f"largest normal force {landing:.1f} times the load at rest")
 
 # %%
-# Two flights, and a bounce after each.
+# The bearing lifts off twice, and bounces after each landing.
 
 figure, axes = plt.subplots()
 axes.plot(data["time"], 1e3 * rise)

@@ -1,8 +1,9 @@
 """Floor spectra above bearings
 ============================
 
-For whoever fastens equipment: response spectra of the ground and of the roof of a house of two storeys on four triple
-pendulums. The roof sees a fraction of what the ground has up to a second, and keeps the long periods.
+For whoever fastens equipment: response spectra of the ground and of the roof of a two-storey building on four triple
+pendulums. Up to a period of a second the roof has a fraction of the ground's spectral acceleration; at long periods the
+bearings reduce nothing.
 """
 
 import matplotlib.pyplot as plt

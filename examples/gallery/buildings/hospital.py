@@ -32,7 +32,7 @@ building = Building.shear(base, [storey] * 3, damping_ratio=0.05).reduced(30.0)
 print("frequencies on a fixed base [Hz]:", np.round(building.frequencies[:3], 2))
 
 # %%
-# Steel, liner, pedestal and ground are springs and dampers between each bearing and the frame.
+# The joint between each bearing and the frame, springs and dampers, stands for steel, liner, pedestal and ground.
 
 between = Top.node(1e9, 2e9, 5e7, damping=1e6, vertical_damping=6e6, rotational_damping=1e5)
 grid = [(x, y) for x in (-11.25, -3.75, 3.75, 11.25) for y in (-7.5, 0.0, 7.5)]

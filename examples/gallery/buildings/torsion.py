@@ -2,8 +2,8 @@
 ================================
 
 For whoever adds 5 % of accidental eccentricity: strength and stiffness of a pendulum grow with the load on it, so that
-bearings below the heavy side resist more. A building whose masses are off the centre hardly turns, whatever the
-formula of codes has.
+bearings below the heavy side resist more. A building whose masses are off the centre hardly twists, while the formula
+of codes predicts amplification.
 """
 
 import matplotlib.pyplot as plt

@@ -1,8 +1,9 @@
 """Upper and lower bounds of friction
 ==================================
 
-For whoever designs by a code: friction that ages and differs from device to device is multiplied by factors, here those
-of ASCE 7, and the same earthquake runs three times. The lower bound decides the displacement, the upper one the force.
+For whoever designs by a code: friction that ages and differs from device to device is multiplied by factors, here the
+factors of ASCE 7, and the same earthquake runs three times. The lower bound decides the displacement, the upper bound
+the force.
 """
 
 import matplotlib.pyplot as plt

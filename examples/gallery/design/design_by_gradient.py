@@ -2,8 +2,8 @@
 =====================
 
 For whoever looks for friction and radius: the least base shear of a triple pendulum that stays within 200 mm under two
-earthquakes. Every run gives its derivatives too, so that SciPy needs ten of them. The page on this design explains it
-and confirms the answer by a scan.
+earthquakes. Every run gives its derivatives too, so that SciPy needs few of them. docs/gradients.md explains the design
+and confirms the result by a scan.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -40,7 +40,7 @@ def changed(scene, friction, radius):
 
 
 # %%
-# A run and its derivatives. One value of both outer surfaces has the sum of two derivatives.
+# A run and its derivatives. A value that both outer surfaces share has the sum of their two derivatives.
 
 
 def response(scene):

@@ -1,8 +1,8 @@
 """Fragility of a displacement capacity
 ====================================
 
-For whoever asks how strong an earthquake a bearing stands: four motions of the Ridgecrest earthquake of 2019 at eight
-scales, and the probability that the displacement exceeds the capacity, by spectral acceleration.
+For whoever asks how strong an earthquake a bearing withstands: four motions of the Ridgecrest earthquake of 2019 at
+eight scales, and the probability that the displacement exceeds the capacity, by spectral acceleration.
 """
 
 from tempfile import mkdtemp
@@ -44,7 +44,7 @@ print(f"half exceed {1e3 * CAPACITY:.0f} mm at Sa(2.5 s) = {curve.median:.2f} m/
 print(f"dispersion {curve.dispersion:.2f}; {curve.exceeded} of {curve.runs} runs exceed it")
 
 # %%
-# Dots are runs, at one where they exceed the capacity.
+# Each dot is a run; it lies at 1 where the run exceeds the capacity.
 
 intensity = np.linspace(1.0, 7.0, 200)
 figure, axes = plt.subplots()

@@ -1,7 +1,7 @@
 """A Pareto front with pymoo
 =========================
 
-For whoever has two wishes that exclude each other: least displacement and least base shear of a triple pendulum under a
+For whoever has two conflicting aims: least displacement and least base shear of a triple pendulum under a
 record. NSGA-II of pymoo proposes friction and radii, and each generation is a batch of runs.
 """
 
@@ -42,7 +42,7 @@ def objectives(result):
 
 
 # %%
-# The designs that no other one beats in both.
+# The designs that no other design beats in both objectives.
 
 found = minimize(Design(), NSGA2(pop_size=DESIGNS), ("n_gen", GENERATIONS), seed=1)
 for x, (displacement, force) in sorted(zip(found.X.tolist(), found.F.tolist(), strict=True), key=lambda row: row[1]):

@@ -35,7 +35,7 @@ for name, first, total in zip(AXES, indices["S1"], indices["ST"], strict=True):
     print(f"{name:8} first order {first:.2f}, total {total:.2f}")
 
 # %%
-# The share of the variance of the peak force, with all interactions.
+# The share of each quantity in the variance of the peak force, with all interactions.
 
 figure, axes = plt.subplots()
 axes.barh(list(AXES), 100 * indices["ST"], xerr=100 * indices["ST_conf"])

@@ -22,7 +22,7 @@ for finding in found.findings:
         print(f"{finding.title}: {finding.sentence}")
 
 # %%
-# What decides: the bearings are all that holds the plant, so that their force over its acceleration is its mass.
+# The evidence: only the bearings hold the plant, so that their force over its acceleration is its mass.
 
 data = pd.read_csv(FOLDER / "case1.csv", comment="#")
 force, acceleration = 70 * data["iso1_fb_shear1"], data["basemat_accel_x"]  # [GN], [m/s^2]

@@ -196,10 +196,9 @@ def bound(
     ends with different models, all cases run again with every effect that any of them needs.
 
     table: of property modification factors; without it the lower and upper friction of the bearing itself. force:
-    whether it also runs with values that no unit can make right. progress: called with the share of the runs that is
-    done, and 1. Raises
-    InputError: a bearing without bounds, a factor of a surface that the bearing does not have, a pendulum that is
-    "equivalent" to a stack, or a bearing that does not move; RunError: no case has rows.
+    whether to run also with values that are implausible in any unit. progress: called with the share of the runs that
+    is done, and 1. Raises InputError: a bearing without bounds, a factor of a surface that the bearing does not have, a
+    pendulum that is "equivalent" to a stack, or a bearing that does not move; RunError: no case has rows.
     """
     require_meant(scene, force=force)
     cases = _cases(scene, table, progress)

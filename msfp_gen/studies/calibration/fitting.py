@@ -66,7 +66,7 @@ def fit(
             done, and the last deviation [N]. An exception in it ends the fit.
         max_evaluations: largest number of evaluations in the search; the runs with smaller tolerances after the search
             are not counted.
-        force: whether it also starts from values of the scene that no unit can make right.
+        force: whether to start also from values of the scene that are implausible in any unit.
 
     Raises InputError of one line: a file, a parameter or a bound is wrong, or runs of the scene have no gradients.
     RunError: a run of the given scene fails, or the fit has not converged after `max_evaluations`.

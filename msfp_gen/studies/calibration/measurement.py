@@ -34,8 +34,8 @@ class Measurement:
         time: ndarray, shape (k,), [s], increasing.
         displacement: across the bearing, base less top, ndarray, shape (k,), [m].
         force: of the bearing on the support of the top plate, ndarray, shape (k,), [N]. In a loop it has the sign of
-            the displacement. A change of the sign of both changes no fitted value.
-        axial_load: [N]; None: of the scene.
+            the displacement. If both have the other sign, the fitted values are the same.
+        axial_load: [N]; None: the axial load of the scene.
         weight: of the residuals of this test [-]; 2 counts as a standard deviation half as large.
 
     Raises:
