@@ -182,12 +182,10 @@ def snapped(knots: Array, coefficients: Array, times: Array) -> tuple[Array, Arr
 
 
 def _in_vectors(coefficients: Array) -> Array:
-    """Coefficients, shape (k, channels, 6), grouped by vectors of three channels: (k, vectors, components, 6).
-
-    Vectors and components that are always zero, which ask for nothing, are left out; one remains.
-    """
+    """Coefficients, shape (k, channels, 6), grouped by vectors of three channels: (k, vectors, components, 6)."""
     count, channels, _ = coefficients.shape
     pieces = coefficients.reshape(count, max(channels // 3, 1), -1, ORDER)
+    # Vectors and components that are always zero ask for nothing and are left out; one remains.
     used = (pieces != 0).any(axis=(0, 3))
     return pieces[:, used.any(axis=1)][:, :, used.any(axis=0)] if used.any() else pieces[:, :1, :1]
 

@@ -338,10 +338,7 @@ class Workers(Executor):
 
 
 def _begin_process(parent: int, folder: str | None) -> None:
-    """Leave Ctrl-C, which a terminal sends to all processes, to the parent, and end when it has died.
-
-    folder: of the files in memory, which goes with it.
-    """
+    """Leave Ctrl-C, which a terminal sends to all processes, to the parent, and end with it and its files in memory."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
@@ -356,10 +353,7 @@ def _begin_process(parent: int, folder: str | None) -> None:
 
 
 def _answer(call: bytes, folder: str | None) -> tuple[bytes, list[Path], float, int]:
-    """In a process: the value of a call as bytes and files, its processor time [s], the process.
-
-    folder: of the files. Raises _UnsuitedError.
-    """
+    """In a process: the value of a call as bytes and files, its processor time [s], the process. Or _UnsuitedError."""
     try:
         function, arguments = pickle.loads(call)
     except Exception as error:  # such as a class that cannot be imported here
