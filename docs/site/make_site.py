@@ -25,6 +25,7 @@ PAGES = (
 )  # fmt: skip
 FILES = ("LICENSE", "CITATION.cff", "examples", "docs/figures", ".github/workflows")
 SOURCES = r"\]\(\.\./((?:generator|msfp_gen)/[^)#]+)\)"  # links of pages to the code
+EXPLORER = "<!-- explorer -->\n"  # where it stands on the page of the bearing
 EXAMPLES = r"\]\(((?:\.\./)?)examples(?:/gallery/(\w+/\w+)\.py)?\)"  # links to the examples, or to one of the gallery
 
 
@@ -32,7 +33,9 @@ def main() -> None:
     """Write the site into the folder of -o."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "build" / "docs")
-    parser.add_argument("--no-gallery", action="store_true", help="leave out the examples, which are run otherwise")
+    parser.add_argument(
+        "--no-gallery", action="store_true", help="leave out the examples and the explorer, which run code otherwise"
+    )
     given = parser.parse_args()
     with TemporaryDirectory() as folder:
         source = Path(folder) / "source"
@@ -61,6 +64,7 @@ def collect(source: Path, *, gallery: bool) -> None:
         (shutil.copytree if (ROOT / name).is_dir() else shutil.copyfile)(ROOT / name, source / name)
     if gallery:
         leave_out(source / "examples" / "gallery")
+    live = gallery and find_spec("ziglang") is not None
 
     def target(link: re.Match[str]) -> str:
         """A link to the examples leads to their gallery, where there is one."""
@@ -73,11 +77,30 @@ def collect(source: Path, *, gallery: bool) -> None:
         page = source / path.relative_to(ROOT)
         page.parent.mkdir(parents=True, exist_ok=True)
         page.write_text(re.sub(EXAMPLES, target, path.read_text(encoding="utf-8")), encoding="utf-8")
+    page = source / "docs" / "bearing.md"
+    text = page.read_text(encoding="utf-8")
+    page.write_text(text.replace(EXPLORER, explorer(text, source / "_static") if live else ""), encoding="utf-8")
     (source / "cli.md").write_text(command_page(), encoding="utf-8")
     for name in () if gallery else ("start.md", "buildings.md"):
         page = source / name
         lines = [line for line in page.read_text(encoding="utf-8").splitlines() if "gallery/" not in line]
         page.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def explorer(page: str, folder: Path) -> str:
+    """Write the explorer of the first data sheet of a page into a folder; returns what the page shows of it."""
+    sheet = page.partition("```toml\n")[2].partition("```")[0]
+    with TemporaryDirectory() as name:
+        scene = Path(name) / "scene.toml"
+        scene.write_text((SITE / "explorer.toml").read_text(encoding="utf-8") + sheet, encoding="utf-8")
+        command = [sys.executable, "-m", "msfp_gen", "explore", str(scene), "-o", str(folder / "explorer.html")]
+        if (done := subprocess.run(command, cwd=ROOT, text=True, capture_output=True)).returncode:
+            raise SystemExit(done.stderr)
+    return (
+        "Move a control, and this bearing runs again in your browser ([explorer](figures.md#the-explorer)):\n\n"
+        '<iframe class="explorer" src="../_static/explorer.html" title="Explorer of this bearing" loading="lazy">'
+        "</iframe>\n"
+    )
 
 
 def command_page() -> str:

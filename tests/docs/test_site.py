@@ -139,9 +139,11 @@ def test_site_is_built_without_a_warning(tmp_path: Path) -> None:
 
 @needs_sphinx
 @pytest.mark.slow
-def test_gallery_runs_every_example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_gallery_runs_every_example_and_the_explorer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     build(tmp_path / "site")
     check_site(tmp_path / "site")
+    bearing = (tmp_path / "site" / "docs" / "bearing.html").read_text(encoding="utf-8")
+    assert ('<iframe class="explorer"' in bearing) == (importlib.util.find_spec("ziglang") is not None)
     kept = shutil.copytree(EXAMPLES, tmp_path / "kept")
     site_module(monkeypatch, "make_site").leave_out(kept)
     examples = {path.relative_to(kept).with_suffix("") for path in kept.rglob("*.py")}
