@@ -82,6 +82,7 @@ sphinx_gallery_conf = {
     "subsection_order": SECTIONS,
     "within_subsection_order": "gallery_settings.Order",
     "capture_repr": ("_repr_html_", "__repr__"),
+    "ignore_repr_types": r"list|matplotlib",  # what functions of pyplot return
     "image_scrapers": ("matplotlib", "gallery_settings.figures"),
     "reset_modules": ("matplotlib", "gallery_settings.style"),
 }

@@ -154,4 +154,5 @@ def test_gallery_runs_every_example_and_the_explorer(tmp_path: Path, monkeypatch
         page = (pages / example).with_suffix(".html").read_text(encoding="utf-8")
         assert f"_images/sphx_glr_{example.name}_001.png" in page, f"{example} has no figure"
         assert str(ROOT) not in page, "a path of this machine"
+        assert "[Text(" not in page, "what a function of pyplot returns"
         assert f"{example.name}.ipynb" in page and f"{example.name}.py" in page
