@@ -26,7 +26,7 @@ FIGURES = {
     "28 times faster: 4.1 ms against 113 ms": ("performance", "28 times: 4.1 ms against 113 ms"),
     "33 ms at a tolerance of 3e-2, with a force error of 0.25 %": ("performance", "33 ms at 3e-2, error 0.25 %"),
     "in 30 cases": ("verification", "30 cases contain every value of every effect"),
-    "within 0.2 of theory": ("verification", "observed orders are within 0.2 of it"),
+    "within 0.2 of theory": ("verification", "Observed orders are within 0.2 of it"),
     "1828 comparisons": ("validation", "1828 comparisons"),
     "1767 of them": ("validation", "1767 of them within the tolerance"),
     "hundreds to thousands of hertz": ("glossary", "at hundreds to thousands of hertz"),
