@@ -36,10 +36,11 @@ class Pieces(NamedTuple):
 
 
 class Travelling:
-    """A frozen dataclass whose checked fields are copied and pickled alone: without what was derived from them."""
+    """A frozen dataclass that is copied and pickled with its checked fields, and with its `resolution` once known."""
 
     def __getstate__(self) -> dict[str, Any]:
-        return {each.name: getattr(self, each.name) for each in fields(self)}  # type: ignore[arg-type]
+        names = (*(each.name for each in fields(self)), "resolution")  # type: ignore[arg-type]
+        return {name: vars(self)[name] for name in names if name in vars(self)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)

@@ -88,7 +88,7 @@ def completed_runs(
             if strict and "strict" not in scene.run_options:
                 raise InputError("strict: only runs of one bearing have it; leave it out")
     report = None if progress is None else SharedProgress(len(scenes), progress).of
-    threads = max(1, usable_cores() // max(1, min(count, len(scenes))))
+    threads = 1 if min(count, len(scenes)) >= usable_cores() else None  # of a building; None: it chooses
 
     def results() -> Generator[tuple[int, Any], None, None]:
         build_models(scenes)
@@ -149,7 +149,7 @@ def _located(label: str) -> Iterator[None]:
         raise RunError(f"{label}: {error}", status=error.status, result=error.result) from error
 
 
-def _run(label: str, scene: System, strict: bool, threads: int) -> Any:
+def _run(label: str, scene: System, strict: bool, threads: int | None) -> Any:
     """The result of one run of a batch, in a worker; its RunError if it has no rows."""
     try:
         with _located(label):

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import atexit
 import io
-import mmap
 import os
 import pickle
 import shutil
@@ -213,8 +212,11 @@ def local_pool(workers: int | None = None, ways: Ways | None = None) -> Iterator
     """
     count = worker_count(workers)
     idle = _idle[os.getpid(), count]  # threads do not survive a fork
-    executor = idle.pop() if idle else Workers(count)
-    executor.ways, executor.began = ways or Ways(), time.perf_counter()
+    try:
+        executor = idle.pop()
+    except IndexError:
+        executor = Workers(count)
+    executor.begin(ways or Ways())
     try:
         yield Pool(executor, lambda: AHEAD * count, "workers")
     except BaseException:
@@ -245,18 +247,30 @@ class Workers(Executor):
         self._processes: Any = None  # executor of loky
         self._folder: str | None = None  # of the files in memory
         self._known: set[int] = set()  # processes that have ended a call: their start is over
+        self._answered = 0.0  # when a process last ended a call [s]
+        self._under_way = 0  # calls
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._waited = 0.0
         self._suited = count > 1
         self.ways = Ways()
-        self.began = time.perf_counter()  # the block of the pool [s]
+        self._began = 0.0  # when a call was submitted while there was none [s]
+
+    def begin(self, ways: Ways) -> None:
+        """Begin a block of calls, of which `ways` tell something."""
+        self.ways, self._suited = ways, self._count > 1
 
     def submit(  # type: ignore[override]
         self, function: Callable[..., T], /, *arguments: Any, report: Report | None = None
     ) -> Future[T]:
         """See `Executor`. report: called with the progress of the call; from a process only when it has ended."""
-        return self._threads.submit(self._call, function, arguments, report)
+        with self._lock:
+            if not self._under_way:  # what went before is no time in which a call waited, such as builds of models
+                self._began = time.perf_counter()
+            self._under_way += 1
+        future = self._threads.submit(self._call, function, arguments, report)
+        future.add_done_callback(self._done)
+        return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """See `Executor`; calls that run are ended. cancel_futures: also those that run in processes."""
@@ -274,11 +288,15 @@ class Workers(Executor):
     def _call(self, function: Callable[..., T], arguments: tuple[Any, ...], report: Report | None) -> T:
         """The value of a call, in this thread or in a process."""
         # The wait for the global lock, of this thread and of the thread that submits, begins with the last call's end.
-        begin = max(self.began, getattr(_worker, "ended", 0.0))
+        begin = max(self._began, getattr(_worker, "ended", 0.0))
         try:
             return self._run(function, arguments, report, begin)
         finally:
             _worker.ended = time.perf_counter()
+
+    def _done(self, _: Future[Any]) -> None:
+        with self._lock:
+            self._under_way -= 1
 
     def _run(self, function: Callable[..., T], arguments: tuple[Any, ...], report: Report | None, begin: float) -> T:
         """The same. begin: since when this thread was free [s]."""
@@ -329,11 +347,18 @@ class Workers(Executor):
             if self._stop.is_set():
                 raise _StoppedError from error
             raise
-        found = _Unpickler(io.BytesIO(value), arguments, [_mapped(path) for path in files]).load()
+        try:
+            found = _Unpickler(io.BytesIO(value), arguments, [_content(path) for path in files]).load()
+        except Exception as error:  # such as a class that is not imported here by the same name
+            raise _UnsuitedError from error
         with self._lock:
+            now = time.perf_counter()
+            if now - self._answered > IDLE:  # other processes have started
+                self._known.clear()
             if len(self._known) >= self._count:  # until then calls wait for processes that start
-                way.add(time.perf_counter() - begin, worked)
+                way.add(now - begin, worked)
             self._known.add(process)
+            self._answered = now
         return found
 
 
@@ -392,10 +417,11 @@ def _packed(value: Any, known: tuple[Any, ...], folder: str | None) -> tuple[byt
     return stream.getvalue(), files
 
 
-def _mapped(path: Path) -> mmap.mmap:
-    """The content of a file in memory, which is gone when the last array in it is."""
+def _content(path: Path) -> bytearray:
+    """The content of a file in memory, which is deleted. (Every map of a file would keep a descriptor.)"""
+    content = bytearray(path.stat().st_size)
     with path.open("rb") as file:
-        content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)
+        file.readinto(content)
     path.unlink()
     return content
 
@@ -415,7 +441,7 @@ class _Pickler(pickle.Pickler):
 class _Unpickler(pickle.Unpickler):
     """As `_Pickler` wrote."""
 
-    def __init__(self, stream: io.BytesIO, known: tuple[Any, ...], arrays: list[mmap.mmap]) -> None:
+    def __init__(self, stream: io.BytesIO, known: tuple[Any, ...], arrays: list[bytearray]) -> None:
         super().__init__(stream, buffers=arrays)
         self._objects = known
 

@@ -100,13 +100,13 @@ ROWS = f"__import__('numpy').full(({module.LARGE // 8}, 2), 0.25)"
 
 @pytest.mark.skipif(not module.MEMORY.is_dir(), reason="no files in memory")
 def test_large_arrays_come_in_files_in_memory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """They are those of the process, may be changed, and leave no file behind, nor a folder when workers end."""
+    """They are equal, may be changed, and leave no file behind, nor a folder when workers end."""
     end_idle()
     monkeypatch.setattr(module, "MEMORY", tmp_path)
     monkeypatch.setattr(Workers, "in_process", lambda *_: True)
     mapped: list[Path] = []
-    take = module._mapped
-    monkeypatch.setattr(module, "_mapped", lambda path: (mapped.append(path), take(path))[1])
+    take = module._content
+    monkeypatch.setattr(module, "_content", lambda path: (mapped.append(path), take(path))[1])
     for found in all_of(eval, [ROWS] * 4):
         assert found.shape == (module.LARGE // 8, 2) and (found == 0.25).all()
         found[0, 0] = 1.0
