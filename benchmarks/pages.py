@@ -46,7 +46,9 @@ def filled(text: str, outputs: dict[str, str], today: str) -> str:
 
     def measured(match: re.Match[str]) -> str:
         command, old = match.groups()
-        new = next(tables.get(command, iter(())), old)
+        new = next(tables.get(command, iter(())), old if QUICK or command not in tables else None)
+        if new is None:
+            raise SystemExit(f"{command}: it prints fewer tables than the page has")
         return match[0].replace(old, f"{new.rstrip()}\n")
 
     text = MARKED.sub(measured, text)

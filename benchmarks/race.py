@@ -134,7 +134,7 @@ def write_course(course: Course, reference: Trial) -> None:
 
 def within(rows: list[Result], bound: float) -> str:
     """A cell of the table."""
-    if any(10 * row.floor > bound for row in rows):
+    if not all(10 * row.floor <= bound for row in rows):  # nor where it is not known at all
         return "?"
     return f"{min(times):.2g} s" if (times := [row.seconds for row in rows if row.error <= bound]) else "-"
 
@@ -189,9 +189,9 @@ and a converged reference, and what others need for them.
    stated; a bound below ten times this difference has a question mark. The reference of OpenSees is its finest run.
 
 SciPy's methods step in Python and call the compiled equations with their exact Jacobian, so their seconds are what a user
-of SciPy waits for. MuJoCo and Drake are not among the entrants: MuJoCo collides meshes as their convex hulls, so that no
-slider fits into a dish, and Drake's contact of nonconvex meshes is by pressure fields over patches, which is another model
-with parameters that no bearing states.
+of SciPy waits for. MuJoCo and Drake are not among the entrants. A sphere in a dish is possible there, by signed distances
+in MuJoCo and by pressure fields over meshes in Drake, but both make contact and friction soft by parameters that no
+bearing states, so that they converge to the motion of another model.
 
 """
 
