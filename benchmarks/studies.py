@@ -198,28 +198,29 @@ def cores(folder: Path, _: int) -> Iterator[str]:
 
 
 def overhead(folder: Path, _: int) -> Iterator[str]:
-    """CPU time of a study on one worker over that of a loop of `simulate` with its scenes, best of rounds in turns."""
-    study = load_study(ten_ms(pick(256, 32), chunk=32))
-    scenes = [study.scene(run) for run in range(1, study.runs + 1)]
-
-    def loop() -> None:
-        for scene in scenes:
-            simulate(scene)
-
-    loops, studies = [], []
-    for number in range(pick(5, 1)):
-        loops.append(_seconds(loop))
-        studies.append(_seconds(lambda: msfp_gen.study(study, folder / str(number), workers=1)))  # noqa: B023
-    share = min(studies) / min(loops) - 1
-    each = 1e3 * min(loops) / len(scenes)
-    yield f"CPU time of a study on one worker beyond that of a loop of `simulate`, {each:.0f} ms a run | {100 * share:.1f} %"
-
-
-def _seconds(work: Callable[[], object]) -> float:
-    """CPU time of a call, all threads together: other programs on the machine count little."""
-    begin = time.process_time()
-    work()
-    return time.process_time() - begin
+    """CPU time of Python around runs, alone and in a study on one worker, and the time of a first run; best of rounds."""
+    for name, table in {"planar runs": planar(pick(512, 32)), "spatial runs": ten_ms(pick(128, 16), chunk=32)}.items():
+        study = load_study(table)
+        scenes = [study.scene(run) for run in range(1, study.runs + 1)]
+        steps, loops, studies = [], [], []
+        for number in range(pick(5, 1)):
+            begin = time.process_time()
+            runs = [simulate(scene) for scene in scenes]
+            loops.append(time.process_time() - begin)
+            steps.append(sum(run.counters.wall_time for run in runs))
+            begin = time.process_time()
+            msfp_gen.study(study, folder / f"{name} {number}", workers=1)
+            studies.append(time.process_time() - begin)
+        integrated, run, row = (1e3 * min(each) / len(scenes) for each in (steps, loops, studies))
+        text = f"{name}: integration, the rest of `simulate`, the rest of a row of a study on one worker"
+        yield f"{text} | {integrated:.2f}, {run - integrated:.2f}, {row - run:.2f} ms"
+    command = [sys.executable, "-c", "import msfp_gen as m; m.simulate(m.load_scene('fenz-test2'))"]
+    firsts = []
+    for _ in range(pick(5, 1)):
+        begin = time.perf_counter()
+        subprocess.run(command, check=True)
+        firsts.append(time.perf_counter() - begin)
+    yield f"a new process that imports the package and runs a preset, its model in the cache | {min(firsts):.2f} s"
 
 
 def fragilities(folder: Path, _: int) -> Iterator[str]:

@@ -13,7 +13,7 @@ import numpy as np
 import run_tutorial
 
 from msfp_gen import figures, load_scene, simulate, study
-from msfp_gen.cli.run_commands import DEMO, DEMO_TOLERANCES
+from msfp_gen.cli.run_commands import DEMO, DEMO_METHODS, DEMO_TOLERANCES
 from msfp_gen.figures import style
 from msfp_gen.motions.records import baseline_corrected, bundled, response_spectrum
 from msfp_gen.results.geometry import sections
@@ -143,7 +143,7 @@ def draw_cost(folder: Path) -> None:
 
 def draw_demo(folder: Path) -> None:
     """What accuracy costs in the first scene of `make demo`, for README."""
-    found = work_precision(load_scene(DEMO[0]), methods=["implicit"], tolerances=pick(DEMO_TOLERANCES, (1e-2,)))
+    found = work_precision(load_scene(DEMO[0]), methods=DEMO_METHODS, tolerances=pick(DEMO_TOLERANCES, (1e-2,)))
     draw_summary(found, folder / "demo-accuracy.png")
 
 

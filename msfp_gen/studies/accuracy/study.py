@@ -455,14 +455,16 @@ def summary_line(study: Study) -> str:
 
 
 def cost_table(study: Study) -> Table:
-    """Error against seconds of every run that ended, in four columns."""
+    """Error against seconds of every run that ended, in four columns; the title says to what the errors are known."""
+    floor = study.reference.floor
+    known = "errors are not confirmed" if floor is None else f"errors are known to {_share(floor.worst_rms)}"
     cells = [
         (one.series, one.trial.setting, _share(one.errors.worst_rms), _time(one.trial.seconds))
         for one in study.points
         if one.errors is not None
     ]
     return Table(
-        f"what accuracy costs: {summary_line(study)}",
+        f"what accuracy costs: {summary_line(study)}; {known}",
         ("", "tolerance", f"error of {_quantities(study)}, RMS", "time"),
         cells,
     )

@@ -225,6 +225,9 @@ def test_failures_and_wrong_successes_are_marked():
     cells = study.tables(made)[0].rows
     assert cells[0][2] == "WRONG SUCCESS" and cells[1][2] == "newton" and cells[2][3] == "(about 20)"
     assert [row[2] for row in study.cost_table(made).rows] == ["14 %"]  # 0.2 times sqrt(1/2)
+    assert "errors are known to" in study.cost_table(made).title
+    alone = replace(made, reference=replace(reference, floor=None))
+    assert "errors are not confirmed" in study.cost_table(alone).title
     left_out = Point("c", trial("c", status=REFUSED), None, False)
     assert "c" not in study.figure_table(replace(made, points=(*points, left_out)))
 
