@@ -12,10 +12,12 @@ from support import ROOT
 from support.audits import SPACE, SPOILED, rows_of, run_of, shaken, straightened, with_columns, with_force
 
 from msfp_gen import audit, load_scene, simulate
+from msfp_gen.auditing import Histories
 from msfp_gen.auditing.histories import histories_of
 from msfp_gen.auditing.momentum import momentum
 from msfp_gen.auditing.sliding import Sliding
 from msfp_gen.auditing.stated import stated_of
+from msfp_gen.studies.accuracy.series import run_opensees
 
 
 @cache
@@ -209,3 +211,25 @@ def test_sound_results_of_stacks(law, axes, kind):
         choices = {"law": law, "axes": axes, "preset": kind, "scale": share * scale, "step": step, **changes}
         found = audit(run_of(**choices), shaken(**choices))
         assert not found.inconsistent, (scale, step, [f.sentence for f in found.inconsistent])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("at", ["surface", "pivot"])
+@pytest.mark.parametrize(
+    "name", [*(f"fenz-test{k}" for k in range(1, 6)), *(f"becker-{k}" for k in ("circle-50", "circle-88", "eight-88"))]
+)
+def test_sound_results_of_opensees(name, at):
+    """Its element on a rig, with 2000 rows; its friction acts at the pivot, and the audit finds that where it can."""
+    pytest.importorskip("openseespy.opensees", exc_type=Exception)
+    scene = load_scene(name)
+    force = run_opensees(scene, 2000).histories["force"][:, 0]
+    time = np.linspace(0.0, scene.end, 2001)
+    across = scene.motion.displacement(time)[:, :2]
+    columns = dict(zip(("displacement_1", "displacement_2"), (across - across[0]).T, strict=True))
+    columns |= {"time": time, "axial": np.full(len(time), scene.top.axial_load)}
+    data = Histories(name, columns | dict(zip(("force_1", "force_2"), force.T, strict=True)))
+    friction = [surface.friction for surface in scene.bearing.surfaces]
+    found = audit(data, scene.bearing.replace(friction=friction, friction_at=at))
+    assert not found.inconsistent, found.text
+    if at == "pivot" and found.finding("friction").verdict == "consistent":
+        assert found.finding("friction").value == pytest.approx(1.0, abs=0.05)
