@@ -54,6 +54,9 @@ def test_the_mass_of_a_scene_is_on_one_bearing():
     assert finding(seventy, "weight").verdict == CONSISTENT
     assert finding(replace(seventy, mass=70.0 * MASS), "weight").verdict == CONSISTENT
     assert finding(replace(seventy, mass=MASS), "weight").value == pytest.approx(70.0)
+    uneven = finding(replace(seventy, mass=77.0 * MASS), "weight")
+    assert uneven.verdict == "not decidable" and "share it equally" in uneven.sentence
+    assert finding(replace(seventy, mass=140.0 * MASS), "weight").verdict == INCONSISTENT
 
 
 def test_a_record_that_returns_to_the_centre_has_its_signs():
