@@ -21,9 +21,9 @@ ROOT = SITE.parents[1]
 # Pages outside docs/, and files that pages link to.
 PAGES = (
     "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "ROADMAP.md", "SECURITY.md", "CODE_OF_CONDUCT.md",
-    "benchmarks/README.md",
+    "benchmarks/README.md", "benchmarks/isolation/README.md",
 )  # fmt: skip
-FILES = ("LICENSE", "CITATION.cff", "examples", "docs/figures", ".github/workflows")
+FILES = ("LICENSE", "CITATION.cff", "examples", "docs/figures", "benchmarks/isolation", ".github/workflows")
 SOURCES = r"\]\(\.\./((?:generator|msfp_gen)/[^)#]+)\)"  # links of pages to the code
 EXPLORER = "<!-- explorer -->\n"  # where it stands on the page of the bearing
 EXAMPLES = r"\]\(((?:\.\./)?)examples(?:/gallery/(\w+/\w+)\.py)?\)"  # links to the examples, or to one of the gallery
