@@ -349,14 +349,6 @@ class BuildingResult(AnyResult):
         """Tables of the floors, storeys and bearings."""
         return summaries.tables(self.summary)
 
-    def over_steps(self, word: str, field: str) -> None:
-        """None: studies take extremes of columns over the rows of a building."""
-
-    @property
-    def figures(self) -> Mapping[str, Any]:
-        """The figures of the run by their names; see `figures.figures_of`."""
-        return self.scene.figures
-
     def film(self, times: Array, azimuth: float | None) -> Any:
         """The movie of the run; see `figures.movie.film_of`."""
         from msfp_gen.buildings.movie import building_film

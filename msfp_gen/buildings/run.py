@@ -7,6 +7,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import reduce
+from itertools import groupby
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -31,7 +32,7 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.outcome import provenance_of, stopped
 from msfp_gen.simulation.start import RestartState, transferred_heights, transferred_state
 from msfp_gen.specification.contract import WORKS, names
-from msfp_gen.specification.layout import Auto, Effects
+from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +227,9 @@ class BuildingRun:
             message = f"{who}: {stopped(self.time, self.scene.end, status, surface, value)}"
         if status != "ok" and not self.run.row_count:
             raise RunError(message, status=status)
-        about = provenance_of(self.scene.solver, ", ".join(spec.key for spec in self.scene.specs))
+        ended = [member.model.spec for member in self.members]
+        models = dict.fromkeys([_models(self.scene.every_spec), _models(ended)])
+        about = provenance_of(self.scene.solver, ", then ".join(models))
         return replace(result_of(self), provenance=about, status=status, message=message, wall_time=wall)
 
     @property
@@ -392,6 +395,11 @@ def result_of(run: BuildingRun) -> BuildingResult:
         extremes=run.extremes,
         monitored=run.notes,
     )
+
+
+def _models(specs: Sequence[ModelSpec]) -> str:
+    """The models of all bearings in their order; equal ones that follow each other once, with their number."""
+    return ", ".join(f"{len([*same])} x {key}" for key, same in groupby(spec.key for spec in specs))
 
 
 def _threads(threads: int | None, bearings: int) -> int:

@@ -26,6 +26,7 @@ from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
 from msfp_gen.scene.effect_switching import with_monitored
 from msfp_gen.scene.friction_parameters import bearing_for, select_friction
+from msfp_gen.scene.scene import effects_named
 from msfp_gen.scene.scene_fields import Fidelity, Limits
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_seats, check_standing, needed_rotational_stiffness
@@ -313,11 +314,15 @@ class BuildingScene(Printed, OtherSystem):
         return tuple(f"building.bearing[{index}].motion" for index in own)
 
     @property
+    def every_spec(self) -> tuple[ModelSpec, ...]:
+        """Layout and effects of the model of every bearing at the start."""
+        pairs = zip(self.bearings, self.modelled, strict=True)
+        return tuple(ModelSpec(mount.bearing.layout, replace(effects, top_rotation=True)) for mount, effects in pairs)
+
+    @property
     def specs(self) -> tuple[ModelSpec, ...]:
         """Layouts and effects of the models of the bearings, each once."""
-        pairs = zip(self.bearings, self.modelled, strict=True)
-        models = [ModelSpec(mount.bearing.layout, replace(effects, top_rotation=True)) for mount, effects in pairs]
-        return tuple(dict.fromkeys(models))
+        return tuple(dict.fromkeys(self.every_spec))
 
     def start(self, **options: Any) -> Any:
         """The run before its first step; see `simulation.system.start`."""
@@ -432,6 +437,21 @@ class BuildingScene(Printed, OtherSystem):
             for mount, flagged, effects in zip(self.bearings, uplift, self.modelled, strict=True)
         ]
         return self if bearings == list(self.bearings) else replace(self, bearings=bearings)
+
+    def with_effects_of(self, models: Sequence[str]) -> Self | None:
+        """The scene with every effect of several models, by their names, in each bearing that leaves it to monitors.
+
+        None where the models are the same. All bearings take what one needs, so that none adds it on the way.
+        """
+        if len(set(models)) < 2:
+            return None
+        named, bearings = effects_named(models), []
+        for mount, effects, most in zip(self.bearings, self.modelled, self.with_all_effects().modelled, strict=True):
+            added = {
+                name: value for name, value in named.items() if getattr(effects, name) != value == getattr(most, name)
+            }
+            bearings.append(replace(mount, effects=replace(mount.effects or Auto(), **added)) if added else mount)
+        return None if bearings == list(self.bearings) else replace(self, bearings=bearings)
 
     def at_fidelity(self, word: str) -> Any:
         """The scene at a level of fidelity; see `scene.fidelity.at_fidelity`."""

@@ -26,7 +26,7 @@ from msfp_gen.figures.charts import plot_correction, plot_response_spectrum, plo
 from msfp_gen.figures.movie import MOVIE_SUFFIXES, animate, check_movie
 from msfp_gen.figures.section import plot_section
 from msfp_gen.figures.sheet import plot_sheet
-from msfp_gen.results.result import Result
+from msfp_gen.results.result import AnyResult, Result
 from msfp_gen.results.sign import using_sign
 from msfp_gen.scene.scene import Scene
 
@@ -77,6 +77,11 @@ def figures_of(loaded: Any) -> Mapping[str, Callable[[Any, str | Path | None], F
     """Functions that draw the figures of a system or a result, by their names on the command line."""
     figures: Mapping[str, Callable[[Any, str | Path | None], Figure]] = loaded.figures
     return figures
+
+
+@figures_of.register(AnyResult)
+def _figures_of_system(result: AnyResult) -> Mapping[str, Callable[[Any, str | Path | None], Figure]]:
+    return figures_of(result.scene)
 
 
 @figures_of.register(Result)

@@ -269,7 +269,8 @@ class Model:
             for name, value in (given | {"load": np.zeros(6) if load is None else load}).items()
         }
         if self.planar:
-            across = {"q": [0, 2], "v": [0, 2], "h": [1], "base": [1, 3, 5], "load": [1, 3, 5]}
+            coordinates = [0, 2, *range(4, shape[1], 3)]  # psi, phi, and with uplift the separation along E2
+            across = {"q": coordinates, "v": coordinates, "h": [1], "base": [1, 3, 5], "load": [1, 3, 5]}
             for name, axes in across.items():
                 if np.any(arrays[name][..., axes]):
                     raise InputError(f"{name} leaves the E1-E3 plane: give states in it, or dimension = 'spatial'")

@@ -64,6 +64,7 @@ class AnyResult(Printed):
     source: the attribute of a file by which its kind of result is known. storage: what makes its dataset, and reads its
     files. scene: what was run. status: how the run ended; message: one line of text, "" for a run that succeeded.
     counters: of the work of the solver. notes: messages of the monitors, in order of time (docs/effects.md).
+    provenance: versions, names of models and options of the solver, a field.
     """
 
     source: ClassVar[str]
@@ -90,6 +91,10 @@ class AnyResult(Printed):
         @property
         def time(self) -> Array:
             """Times of the rows."""
+
+        @property
+        def provenance(self) -> dict[str, str]:
+            """With what the result was computed."""
 
     @cached_property
     def dataset(self) -> xr.Dataset:
@@ -169,6 +174,13 @@ class AnyResult(Printed):
         first = Table(self.title, (), [*self.stated_rows, *self.work_rows()])
         judged = [self.verdict.table] if self.verdict.readings else []
         return [first, *judged, *self.part_tables()]
+
+    def over_steps(self, word: str, field: str) -> Array | None:
+        """An extreme of a field over all steps, ndarray, shape (m,), [SI]; None: studies take it over the rows.
+
+        Arguments as in `Result.over_steps`.
+        """
+        return None
 
     @cached_property
     def verdict(self) -> Verdict:

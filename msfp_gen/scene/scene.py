@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -34,6 +35,12 @@ WIDER: dict[str, tuple[str, Any]] = {
     "uplift": ("uplift", True),
     "pvt": ("friction", "pvt"),
 }
+
+
+def effects_named(models: Iterable[str]) -> dict[str, Any]:
+    """Effects in the names of models, as `provenance` has them: field of `Auto` -> value."""
+    words = set(re.split(", then |, |-", ", ".join(models)))
+    return {name: value for word, (name, value) in WIDER.items() if word in words}
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -159,11 +166,9 @@ class Scene(Printed, SceneFields):
 
     def with_effects_of(self, models: Sequence[str]) -> Self | None:
         """The scene with every effect of several models, by their names; None where they are the same, or given."""
-        words = [set(model.split("-")) for model in models]
-        if not isinstance(self.effects, Auto) or all(word == words[0] for word in words):
+        if not isinstance(self.effects, Auto) or len(set(models)) < 2:
             return None
-        added = {name: value for word, (name, value) in WIDER.items() if word in set().union(*words)}
-        return replace(self, effects=replace(self.effects, **added))
+        return replace(self, effects=replace(self.effects, **effects_named(models)))
 
     def _check_times(self) -> None:
         if self.duration is not None and self.duration > self.motion.duration * (1 + 1e-12):  # tolerance for rounding

@@ -1,1 +1,1 @@
-"""Runs: the segments of one scene, checkpoints, notes of monitors, batches of scenes."""
+"""Runs: what the runs of all systems have in common, the segments of one bearing, checkpoints, notes of a run."""

@@ -15,7 +15,7 @@ from msfp_gen.common.fields import Choice, ruled_fields
 from msfp_gen.common.tables import Table
 from msfp_gen.results.quantities import quantities
 from msfp_gen.results.verdict import Reading
-from msfp_gen.scene.scene import WIDER
+from msfp_gen.scene.scene import effects_named
 from msfp_gen.scene.system import System
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.specification.formula import names_in
@@ -160,8 +160,7 @@ def _run(system: System) -> tuple[Outcome, dict[str, Any]]:
             value = source.value(result.entry, None)
             columns.setdefault(name, []).append(nan if value is None else float(value))
     values = {name: np.array(each) for name, each in columns.items() if np.isfinite(each).any()}
-    words = result.provenance.get("model", "").replace(", then ", "-").split("-")
-    ended = {name: value for word, (name, value) in WIDER.items() if word in words}
+    ended = effects_named([result.provenance.get("model", "")])
     limits = {one.limit.name: one for one in result.verdict.worst.values()}
     return Outcome(values, limits, min(seconds)), ended
 

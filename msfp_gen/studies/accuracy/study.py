@@ -209,14 +209,13 @@ def check_settings(tolerances: Sequence[float], limit: float) -> None:
 def without_stop(system: Any) -> Any:
     """The system with a duration up to its stop condition in place of this condition, which SciPy does not have.
 
-    All effects are modelled, so that no run changes its model. Uplift is modelled only where `Auto` selects it at the
-    start, since most methods have no uplift: a run in which a surface opens then fails. Another system stays as it is.
+    All effects are modelled, so that no run changes its model. In a scene of one bearing uplift is modelled only where
+    `Auto` selects it at the start, since most methods have no uplift: a run in which a surface opens then fails.
     """
+    complete = system.with_all_effects()
     if "stop" not in system.__dataclass_fields__:
-        return system
-    scene, complete = system, system.with_all_effects()
-    if complete is not scene:
-        scene = replace(complete, effects=replace(complete.modelled, uplift=scene.modelled.uplift))
+        return complete
+    scene = system if complete is system else complete.with_effects(uplift=system.modelled.uplift)
     if scene.stop is None:
         return scene
     end = float(simulate(replace(scene, output_step=None)).history.time[-1])

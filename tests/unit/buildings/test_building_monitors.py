@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.buildings import BEARING, LOAD, rocking
 
-from msfp_gen import Auto, Effects, RunError, simulate
+from msfp_gen import Auto, Effects, RunError, bound, simulate
 from msfp_gen.buildings import scene as selection
 from msfp_gen.buildings.extremes import DIMENSIONS
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.run import start_run
 from msfp_gen.results.result import load_result
 from msfp_gen.scene import effect_switching
+from msfp_gen.scene.scene import effects_named
 from msfp_gen.simulation.start import RestartState
+from msfp_gen.studies.bounding import bounded_scenes, load_factors, runs
 
 
 @pytest.fixture
@@ -69,6 +73,40 @@ def test_no_axial_force_jumps_where_uplift_opens():
     assert jump[:2].max() < 1e-3 * LOAD
     run.run.advance(3)
     assert run.time > time and run.run.status[0] in ("ok", "monitor")  # the next bearing follows soon
+
+
+@pytest.mark.usefixtures("unforeseen")
+def test_runs_with_different_models_get_every_effect_of_them():
+    """Provenance has the models of all bearings at start and end; then all that leave uplift open begin with it."""
+    made = rocking(None)
+    scene = replace(made, bearings=[*made.bearings[:3], replace(made.bearings[3], effects=Auto(uplift=False))])
+    whole = simulate(scene)
+    begun, ended = whole.provenance["model"].split(", then ")
+    (key,) = (spec.key for spec in scene.specs)
+    lifted = key.replace("-top_rotation", "-uplift-top_rotation")
+    assert begun == f"4 x {key}" and ended == f"1 x {key}, 2 x {lifted}, 1 x {key}"
+    wider = scene.with_effects_of([begun, ended])
+    assert [effects.uplift for effects in wider.modelled] == [True, True, True, False]
+    assert scene.with_effects_of([ended, ended]) is None and scene.with_effects_of([]) is None
+    assert scene.with_effects(uplift=False).with_effects_of([begun, ended]) is None
+    assert simulate(wider).provenance["model"] == f"3 x {lifted}, 1 x {key}"
+    assert effects_named([begun]).get("uplift") is None and effects_named([whole.provenance["model"]])["uplift"]
+
+
+@pytest.mark.usefixtures("unforeseen")
+def test_all_cases_of_bounds_have_the_same_effects(monkeypatch):
+    """Two bearings lift off at the upper bound alone; then all cases run again with uplift in every bearing."""
+    scene = replace(rocking(None), duration=1.4)
+    cases = bounded_scenes(scene, load_factors("asce7"))
+    changes = {name: [len(one.model_changes) for one in simulate(case).bearings] for name, case in cases.items()}
+    assert changes == {"lower": [0, 0, 0, 0], "nominal": [0, 0, 0, 0], "upper": [1, 0, 0, 1]}
+    # In this process, where the estimate does not ask for uplift.
+    monkeypatch.setattr(
+        runs, "completed_runs", lambda scenes, **_: ((i, simulate(one)) for i, one in enumerate(scenes))
+    )
+    found = bound(scene, load_factors("asce7"))
+    (model,) = {case.result.provenance["model"] for case in found.cases}
+    assert model.startswith("4 x ") and "-uplift" in model and ", then " not in model
 
 
 @pytest.mark.usefixtures("unforeseen")

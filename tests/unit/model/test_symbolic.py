@@ -39,7 +39,7 @@ def close(found: Any, want: Any) -> bool:
 
 @pytest.mark.parametrize("met", [False, True], ids=("clear", "at the rims"))
 @pytest.mark.parametrize(
-    "layout", thinned([((3, 1, 1),), ((5, 2, 2),), ((6, 3, 2),)], lambda layout: layout == (3, 1, 1))
+    "layout", thinned([((3, 1, 1),), ((5, 2, 2),), ((6, 3, 2),)], lambda layout: layout != (6, 3, 2))
 )
 def test_equations_in_sympy_are_those_of_the_compiled_model(layout, met):
     count = layout[0] - 1
@@ -48,7 +48,6 @@ def test_equations_in_sympy_are_those_of_the_compiled_model(layout, met):
     residual, jacobian, rates = (x.lambdify() for x in (model.residual, model.jacobian(), model.friction_rates))
     points = [getattr(model, name) for name in ("position", "velocity", "acceleration", "rotation")]
     vectors = [x.lambdify() for x in points]
-    assert time.process_time() - begin < 5 or layout[0] > 5
     by_state, by_inputs = (model.jacobian(wrt).lambdify() for wrt in ("state", "inputs"))
     compiled = model_of(layout)
     for seed in range(3):
@@ -69,6 +68,7 @@ def test_equations_in_sympy_are_those_of_the_compiled_model(layout, met):
         at = (at[0], np.concatenate([flat[1][: 3 * count], found.unknowns[3 * count :]]), *at[2:])
         assert np.abs(rates(*at).reshape(-1, 2) - found.friction_rate).max() < 1e-9 * np.abs(found.friction_rate).max()
     assert set(named) - {f"t_{k}" for k in range(1, layout[0] + 1)} == {name for x in points for name in x.names}
+    assert time.process_time() - begin < 5 or layout[0] > 5
 
 
 OTHERS = [{"sliders": "massless"}, {"spin": "patch"}, {"friction": "velocity"}]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +16,17 @@ import pytest
 from msfp_gen import InputError, Motion, Scene, Solver, load_scene, simulate, simulate_batch, study
 from msfp_gen.cli import main
 from msfp_gen.report import write_report
+from msfp_gen.report.frames import view
+from msfp_gen.report.page import BEARING
+from msfp_gen.results.dataset import columns
 from msfp_gen.results.quantities import quantities
+from msfp_gen.results.result import AnyResult, Result
+from msfp_gen.results.summary import rows_of_bearing
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file import catalogue
 from msfp_gen.scene.file.loader import NO_PARTS, scene_from_table, scene_text
 from msfp_gen.scene.system import GROUP, Kind, OtherSystem, kinds
-from msfp_gen.simulation.bearing_run import start_bearing
+from msfp_gen.simulation.bearing_run import BearingRun, start_bearing
 from msfp_gen.studies import read_study
 from msfp_gen.studies.accuracy import simulate_within
 from msfp_gen.studies.accuracy.timed_run import errors, run_native
@@ -47,7 +54,7 @@ class Pair(OtherSystem):
     every_bearing = property(lambda self: (self.whole.bearing,) * 2)
 
     def start(self, **options: Any) -> Any:
-        return start_bearing(self.half, **options)
+        return PairRun(self, start_bearing(self.half, **options))
 
     def explain(self) -> list[Any]:
         return explain(self.half)
@@ -57,6 +64,67 @@ class Pair(OtherSystem):
 
     def quantities(self) -> dict[str, Any]:
         return quantities(self.half)
+
+    def columns(self) -> dict[str, Any]:
+        return columns(self.half)
+
+
+@dataclass(eq=False)
+class PairRun:
+    """The run of one of them, with the result of the pair."""
+
+    pair: Pair
+    run: BearingRun
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.run, name)
+
+    def result(self, with_initial_row: bool = False) -> Any:
+        half = self.run.result(with_initial_row)
+        return PairResult(self.pair, half, half.provenance)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PairResult(AnyResult):
+    """The result of a pair: its peak force is twice the one of each bearing."""
+
+    scene: Pair
+    half: Result
+    provenance: dict[str, str]
+    source = "pair"
+    storage = replace(
+        Result.storage,
+        to_dataset=lambda result: result.half.dataset,
+        arrays_of=lambda result: Result.storage.arrays_of(result.half),
+    )
+    status, message, notes, time, work, compared, curve = (
+        property(attrgetter(f"half.{name}"))
+        for name in ("status", "message", "notes", "time", "work", "compared", "curve")
+    )
+    bearings = property(lambda self: (self.half, self.half))
+    page = property(lambda self: PAGE)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        own = self.half.summary
+        return own | {"peak_force": {axis: 2 * force for axis, force in own["peak_force"].items()}}
+
+    def characterise(self) -> Any:
+        return self.half.characterise()
+
+    def main_results(self) -> Any:
+        return rows_of_bearing(self.summary)
+
+    def part_tables(self) -> Any:
+        return self.half.part_tables()
+
+
+PAGE = BEARING._replace(
+    name="pair",
+    introduction=lambda result: f"Simulation of {len(result.bearings)} equal bearings",
+    figures={},
+    view=lambda result, count: view(result.half, count),
+)
 
 
 def pair_from_table(table: Mapping[str, Any], folder: Path | None = None, parts: Mapping[str, Any] = NO_PARTS) -> Pair:
@@ -100,18 +168,22 @@ def test_a_third_kind_runs_through_everything(file: Path, tmp_path: Path) -> Non
     assert isinstance(pair, Pair) and "pair" in catalogue.words()
     result = simulate(pair, strict=True)
     alone = simulate(pair.half)
-    assert np.array_equal(result.history.top_force, alone.history.top_force)
+    assert isinstance(result, PairResult) and result.scene is pair
+    assert np.array_equal(result.half.history.top_force, alone.history.top_force)
+    assert result.summary["peak_force"]["radial"] == 2 * alone.summary["peak_force"]["radial"]
     (again,) = simulate_batch([pair])
-    assert again.summary["peak_force"] == result.summary["peak_force"]
+    assert isinstance(again, PairResult) and again.summary["peak_force"] == result.summary["peak_force"]
     checkpoint = tmp_path / "pair.ck"
     simulate(pair, checkpoint=checkpoint)
     resumed = simulate(pair, checkpoint=checkpoint, resume=True)
-    assert np.array_equal(resumed.history.top_force, result.history.top_force)
+    assert np.array_equal(resumed.half.history.top_force, result.half.history.top_force)
     page = write_report(result, tmp_path / "pair.html").read_text(encoding="utf-8")
-    assert "triple friction pendulum" in page
+    assert all(words in page for words in ("triple friction pendulum", "The pair in motion", "of 2 equal bearings"))
     axes = {"load": {"sets": "pair.top.axial_load", "values": [224e3, 112e3]}}
-    study({"scene": str(file), "axes": axes, "keep": ["peak_force"]}, tmp_path / "out")
+    reach = {"reach": "peak(displacement_E1)"}
+    study({"scene": str(file), "axes": axes, "keep": ["peak_force"], "quantities": reach}, tmp_path / "out")
     table = read_study(tmp_path / "out")
+    assert table["reach"][0] == np.abs(result.half.history.displacement[:, 0]).max()
     assert table["peak_force"][0] == pytest.approx(result.summary["peak_force"]["radial"], rel=1e-12)
     assert table["peak_force"][1] < 0.6 * table["peak_force"][0]
 

@@ -311,11 +311,21 @@ def swaying():
     return buildings.scene(buildings.frame(), motion=motion, duration=0.5, output_step=0.01)
 
 
+def test_effects_are_fixed_for_all_runs_of_a_building():
+    """No run changes the model of a bearing, where `Auto` would take uplift in on the way."""
+    scene = swaying()
+    fixed = without_stop(scene)
+    assert not any(effects.uplift for effects in scene.modelled) and all(effects.uplift for effects in fixed.modelled)
+    given = scene.with_effects(uplift=False)
+    assert not any(effects.uplift for effects in without_stop(given).modelled)
+
+
 def test_errors_of_a_building_are_those_of_its_own_rows():
     """The error of a run against a much tighter one, by the histories of the results, is the one that is stated."""
     scene = swaying()
     found = work_precision(scene, methods=["implicit", "esdirk4"], tolerances=[1e-2, 1e-4], limit=60.0)
     assert set(found.shown) == {f"{name}_rms" for name in QUANTITIES}
+    scene = found.scene  # with all effects
     loose, exact = (simulate(replace(scene, solver=replace(scene.solver, rtol=rtol))) for rtol in (1e-2, 1e-7))
     away = np.linalg.norm((loose.bearing_displacement - exact.bearing_displacement)[:, :, :2], axis=2)
     peak = np.linalg.norm(exact.bearing_displacement[:, :, :2], axis=2).max()
