@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Rows, Table
 from msfp_gen.results.files import Storage
 from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Extremes, by_axis
+from msfp_gen.results.joining import at_times
 from msfp_gen.results.note import Note
 from msfp_gen.results.result import AnyResult, Curve, Mounting, Result
 from msfp_gen.results.summary import ratios_text, time_row
@@ -194,6 +195,11 @@ class BuildingResult(AnyResult):
     def work(self) -> Mapping[str, float]:
         """Counters of the work of the solver, and wall_time [s]."""
         return {**self.counters, "wall_time": self.wall_time}
+
+    def at_times(self, times: ArrayLike) -> Self:
+        """The result with rows at other times: see `AnyResult.at_times`."""
+        changed: Self = at_times(self, times)
+        return changed
 
     @property
     def compared(self) -> dict[str, Array]:

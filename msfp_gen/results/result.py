@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
@@ -26,6 +27,7 @@ from msfp_gen.results.characterise import characterise as characterise_bearing
 from msfp_gen.results.files import Storage, read_result
 from msfp_gen.results.gradients import Gradients
 from msfp_gen.results.history import BearingRows, Counters, Event, Extremes, History
+from msfp_gen.results.joining import at_times
 from msfp_gen.results.note import DECISIVE, Note, by_importance
 from msfp_gen.results.summary import (
     rows_of_bearing,
@@ -132,6 +134,13 @@ class AnyResult(Printed):
     @abstractmethod
     def work(self) -> Mapping[str, float]:
         """Counters of the work of the solver, and wall_time [s]."""
+
+    @abstractmethod
+    def at_times(self, times: ArrayLike) -> Self:
+        """The result with rows at other times, by linear interpolation between its own rows.
+
+        times: ndarray, shape (K,), or a number [s]. Raises InputError for a time outside the run.
+        """
 
     @property
     @abstractmethod
@@ -341,6 +350,10 @@ class Result(AnyResult):
     def work(self) -> Mapping[str, float]:
         """Counters of the work of the solver, and wall_time [s]; {} below a building, whose result has them."""
         return {} if self.counters is None else asdict(self.counters)
+
+    def at_times(self, times: ArrayLike) -> Self:
+        """The result with rows at other times: see `AnyResult.at_times`."""
+        return replace(self, history=at_times(self.history, times))
 
     @property
     def compared(self) -> dict[str, Array]:
