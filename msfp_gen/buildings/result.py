@@ -449,15 +449,25 @@ def _mounting(building: BuildingResult, index: int) -> Mounting:
     scene, mount, peaks = building.scene, building.scene.bearings[index], building.extremes
     load, displacement = float(scene.axial_loads[index]), float(peaks.bearing_displacement[index, 3])
     least, most = peaks.axial_force[index] / load
+    x, y = scene.places[index].tolist()
     summary = {
         "number": index + 1,
         "name": mount.name,
         "layout": mount.bearing.layout.name,
-        "position": scene.places[index].tolist(),
+        "position": [x, y],
         "displacement_used": displacement / Backbone.of(mount.bearing).capacity,
         "minimum_load_ratio": max(float(least), 0.0),  # below 0 its top plate hangs from the building
         "maximum_load_ratio": float(most),
         **{name: float(getattr(building, name)[-1, index]) for name in ("dissipated", "interface_dissipated")},
     }
-    effects = scene.modelled[index]
-    return Mounting(index + 1, scene.label(index), mount.bearing, effects, load, mount.interface, summary)
+    return Mounting(
+        index + 1,
+        scene.label(index),
+        mount.bearing,
+        scene.modelled[index],
+        load,
+        mount.interface,
+        summary,
+        place_row=("bearing", f"{mount.bearing.layout.name} at ({x:g}, {y:g}) m"),
+        load_row=("N over N at rest", ratios_text(summary)),
+    )

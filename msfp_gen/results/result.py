@@ -35,6 +35,7 @@ from msfp_gen.results.summary import (
     summarise_gradients,
     summary_of_bearing,
     surface_table,
+    time_row,
     transition_table,
     work_rows,
 )
@@ -224,7 +225,8 @@ class Mounting:
 
     number: of the bearing, from 1. label: its number and name, for messages. effects: of its model at the start.
     axial_load: compression at rest [N]. interface: between bearing and building. summary: what the summary of a bearing
-    has of the building.
+    has of the building. place_row, load_row: label and value, for tables, of its place in plan and of its axial force
+    over the load at rest.
     """
 
     number: int
@@ -234,6 +236,8 @@ class Mounting:
     axial_load: float
     interface: Any
     summary: Mapping[str, Any]
+    place_row: tuple[str, str]
+    load_row: tuple[str, str]
 
 
 class Alone(NamedTuple):
@@ -416,7 +420,9 @@ class Result(AnyResult):
 
     def main_results(self) -> Rows:
         """Label and value of the main results."""
-        return rows_of_bearing(self.summary)
+        if self.mounting is None:
+            return rows_of_bearing(self.summary, time_row(self.summary))
+        return rows_of_bearing(self.summary, self.mounting.place_row, [self.mounting.load_row])
 
     @property
     def curve(self) -> Curve:
