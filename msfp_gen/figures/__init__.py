@@ -81,7 +81,7 @@ def figures_of(loaded: Any) -> Mapping[str, Callable[[Any, str | Path | None], F
 
 @figures_of.register(Result)
 def _figures_of_result(result: Result) -> Mapping[str, Callable[[Any, str | Path | None], Figure]]:
-    return FIGURES if result.mounting is None else FIGURES_BELOW
+    return FIGURES if result.is_alone else FIGURES_BELOW
 
 
 @figures_of.register(Scene)

@@ -136,6 +136,16 @@ class AnyResult(Printed):
     def work(self) -> Mapping[str, float]:
         """Counters of the work of the solver, and wall_time [s]."""
 
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The events that the run located; () where it locates none, as below a building, whose notes have them."""
+        return ()
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether this is one bearing that was run alone, whose rows have angles, slips and energies of its parts."""
+        return False
+
     @abstractmethod
     def at_times(self, times: ArrayLike) -> Self:
         """The result with rows at other times, by linear interpolation between its own rows.
@@ -312,6 +322,11 @@ class Result(AnyResult):
             f"{self.label}: the rows of a building have no angles, slips and energies of the parts of a bearing; run "
             "the bearing alone, or draw its overview, loops, orbit or sliding (docs/buildings.md)"
         )
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether the bearing was run alone, without a building."""
+        return self.mounting is None
 
     @property
     def number(self) -> int:

@@ -33,7 +33,7 @@ def is_monotonic(result: Result) -> bool:
 
     Never for a bearing below a building, whose first contacts of rims are not located.
     """
-    if result.number:
+    if not result.is_alone:
         return False
     if result.scene.motion.metadata.get("source") == "ramp":
         return True
