@@ -41,10 +41,7 @@ GUESTS = {
 # Functions outside `buildings` that ask whether they have the scene or the result of one bearing, each with its reason.
 KIND_SWITCHES = {
     "scene.file.source.load_bearing_scene": "states that a scene of one bearing is wanted",
-    "simulation.memory.require_memory": "rows of other systems are few",
-    "simulation.simulate.check_method": "other systems check their method at their start",
     "studies.accuracy.timed_run.require_base_motion_only": "states that a method runs one bearing alone",
-    "studies.accuracy.methods._with_effects": "one planar model for each axis combines histories of one bearing",
     "auditing.stated.stated_of": "states that a check is of one bearing",
 }
 KINDS_OF_SYSTEMS = {"Scene", "BuildingScene", "Result", "BuildingResult"}
