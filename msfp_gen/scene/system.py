@@ -220,6 +220,7 @@ class Kind:
         presets: folder of TOML files with systems of this kind; None: there are none.
         result: gives the class of their results, for files of results; None: there are no such files.
         written_out: the table `key` with what it abbreviates written out, to which paths of fields refer.
+        named: the table of a file that has bearings by name, to which its rows refer; None: there is none.
     """
 
     key: str
@@ -229,6 +230,7 @@ class Kind:
     presets: Traversable | None = None
     result: Callable[[], Any] | None = None
     written_out: Callable[[SceneTable], SceneTable] = lambda table: table
+    named: str | None = None
 
 
 def is_system(value: object) -> bool:
