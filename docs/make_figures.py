@@ -17,7 +17,6 @@ from msfp_gen.cli.run_commands import DEMO, DEMO_METHODS, DEMO_TOLERANCES
 from msfp_gen.figures import style
 from msfp_gen.motions.records import baseline_corrected, bundled, response_spectrum
 from msfp_gen.results.geometry import sections
-from msfp_gen.results.joining import at_times
 from msfp_gen.results.result import Result
 from msfp_gen.studies import fragility, ida, plot_fragility, plot_ida, read_study
 from msfp_gen.studies.accuracy.study import draw_summary, work_precision
@@ -70,7 +69,7 @@ def draw_layouts(folder: Path) -> None:
         for axes, (scene, title) in zip(figure.subplots(2, 3).flat, DEVICES.items(), strict=True):
             given = load_scene(scene)
             result = simulate(replace(given, duration=0.05, output_step=None, stop=None))
-            (section,) = sections(at_times(result, 0.0))
+            (section,) = sections(result.at_times(0.0))
             for polygon in section.bodies:
                 axes.fill(*(polygon * style.MILLI).T, facecolor="#DCE1E7", edgecolor=style.INK, linewidth=0.7)
             for number, face in enumerate(section.faces, start=1):

@@ -137,7 +137,7 @@ def histories_of(result: Any) -> Histories:
 
     Raises InputError for results of buildings.
     """
-    if len(result.bearings) != 1 or result.bearings[0].mounting is not None:
+    if not result.is_alone:
         raise InputError("result: this is the result of a building; give one of its .bearings as a table of columns")
     rows, top = result.history, result.scene.top
     columns = {"time": rows.time, "axial": rows.top_force[:, 2], "rise": -rows.displacement[:, 2]}

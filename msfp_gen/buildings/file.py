@@ -295,4 +295,5 @@ BUILDING = Kind(
     files(__package__) / "presets",
     _result,
     written_out=with_single_bearings,
+    named="bearings",
 )

@@ -12,7 +12,6 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.figures.movie import TALLEST, WIDE, Film, Layout, even
 from msfp_gen.figures.section import STEEL, direction_of
 from msfp_gen.figures.style import BOLD, COLOURS, FAINT, HAIR, INK, LINE, THIN, displacement, headline, subscript
-from msfp_gen.results.joining import at_times
 from msfp_gen.results.sign import shown_sign
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ STATES = {"carries load": STEEL[0], "rim contact": COLOURS[1], "lifted off": "wh
 
 def building_film(result: BuildingResult, times: Array, azimuth: float | None) -> Film:
     """The movie of a building at these times [s], its first elevation along `azimuth` [rad]; None: along E1."""
-    frames = at_times(result, times)
+    frames = result.at_times(times)
     peak = max(float(one.history.horizontal.max()) for one in result.bearings)
     moving = MovingFrame(frames, magnification(result.scene.places, peak))
     first = 0.0 if azimuth is None else azimuth

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Rows, Table
 from msfp_gen.results.files import Storage
 from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Extremes, by_axis
+from msfp_gen.results.joining import at_times
 from msfp_gen.results.note import Note
 from msfp_gen.results.result import AnyResult, Curve, Mounting, Result
 from msfp_gen.results.summary import ratios_text, time_row
@@ -194,6 +195,11 @@ class BuildingResult(AnyResult):
     def work(self) -> Mapping[str, float]:
         """Counters of the work of the solver, and wall_time [s]."""
         return {**self.counters, "wall_time": self.wall_time}
+
+    def at_times(self, times: ArrayLike) -> Self:
+        """The result with rows at other times: see `AnyResult.at_times`."""
+        changed: Self = at_times(self, times)
+        return changed
 
     @property
     def compared(self) -> dict[str, Array]:
@@ -435,15 +441,25 @@ def _mounting(building: BuildingResult, index: int) -> Mounting:
     scene, mount, peaks = building.scene, building.scene.bearings[index], building.extremes
     load, displacement = float(scene.axial_loads[index]), float(peaks.bearing_displacement[index, 3])
     least, most = peaks.axial_force[index] / load
+    x, y = scene.places[index].tolist()
     summary = {
         "number": index + 1,
         "name": mount.name,
         "layout": mount.bearing.layout.name,
-        "position": scene.places[index].tolist(),
+        "position": [x, y],
         "displacement_used": displacement / Backbone.of(mount.bearing).capacity,
         "minimum_load_ratio": max(float(least), 0.0),  # below 0 its top plate hangs from the building
         "maximum_load_ratio": float(most),
         **{name: float(getattr(building, name)[-1, index]) for name in ("dissipated", "interface_dissipated")},
     }
-    effects = scene.modelled[index]
-    return Mounting(index + 1, scene.label(index), mount.bearing, effects, load, mount.interface, summary)
+    return Mounting(
+        index + 1,
+        scene.label(index),
+        mount.bearing,
+        scene.modelled[index],
+        load,
+        mount.interface,
+        summary,
+        place_row=("bearing", f"{mount.bearing.layout.name} at ({x:g}, {y:g}) m"),
+        load_row=("N over N at rest", ratios_text(summary)),
+    )

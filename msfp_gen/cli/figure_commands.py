@@ -85,10 +85,8 @@ def plot(
     _reject_unused(targets, {"--azimuth": azimuth, "--friction-circles": friction_circles or None}, ("section",))
     make_folder(next(iter(targets.values())).parent, "--output")
     result, failure = result_of(loaded, force)
-    from msfp_gen.results.joining import at_times
-
     if time is not None:
-        at_times(result, time)  # refuses a time outside the run before anything is written
+        result.at_times(time)  # refuses a time outside the run before anything is written
     for name, path in targets.items():
         with using_sign(sign):
             if name == "section":

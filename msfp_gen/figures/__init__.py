@@ -86,7 +86,7 @@ def _figures_of_system(result: AnyResult) -> Mapping[str, Callable[[Any, str | P
 
 @figures_of.register(Result)
 def _figures_of_result(result: Result) -> Mapping[str, Callable[[Any, str | Path | None], Figure]]:
-    return FIGURES if result.mounting is None else FIGURES_BELOW
+    return FIGURES if result.is_alone else FIGURES_BELOW
 
 
 @figures_of.register(Scene)

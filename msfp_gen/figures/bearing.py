@@ -37,7 +37,6 @@ from msfp_gen.figures.style import (
     subscript,
 )
 from msfp_gen.results.geometry import contact_offsets, friction_circles, sections, slider_radius
-from msfp_gen.results.joining import at_times
 from msfp_gen.results.result import Result
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.results.sliding import intervals, rims_in_contact, sliding_surfaces
@@ -335,7 +334,7 @@ def plot_force_path(result: Result, path: str | Path | None = None, *, time: flo
     Raises:
         InputError: a time outside the run, a bearing of a building, or a path that cannot be written.
     """
-    then = at_times(result, peak_time(result) if time is None else time)
+    then = result.at_times(peak_time(result) if time is None else time)
     (section,) = sections(then)
     with page(12.5, max(6.0, 1.3 * result.history.surfaces + 1), path) as figure:
         headline(figure, label_of(result))

@@ -38,7 +38,7 @@ from msfp_gen.figures.style import (
 )
 from msfp_gen.motions.checks import positive
 from msfp_gen.results.geometry import Section, sections
-from msfp_gen.results.joining import at_times, checked_times
+from msfp_gen.results.joining import checked_times
 from msfp_gen.results.result import Result
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def film_of(result: Any, times: Array, azimuth: float | None) -> Film:
 @film_of.register(Result)
 def stack_film(result: Result, times: Array, azimuth: float | None) -> Film:
     """The movie of one bearing at these times [s], its section at `azimuth` [rad]."""
-    frames = at_times(result, times)
+    frames = result.at_times(times)
     drawn_sections = sections(frames, azimuth)
     (left, right), (low, high) = limits(drawn_sections)  # drawn over the full width to scale, loop and bars below it
     tall = even(min(TALLEST, (WIDE - 1.0) * (high - low) / (right - left)) + AROUND + BELOW)

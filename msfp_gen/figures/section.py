@@ -26,7 +26,6 @@ from msfp_gen.figures.style import (
 )
 from msfp_gen.results.geometry import Section, sections
 from msfp_gen.results.geometry import friction_circles as circle_radii
-from msfp_gen.results.joining import at_times
 from msfp_gen.results.result import Result
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.results.sliding import rims_in_contact, sliding_surfaces
@@ -71,7 +70,7 @@ def plot_section(
     Raises:
         InputError: a time outside the run, a bearing of a building, or a path that cannot be written.
     """
-    then = at_times(result, peak_time(result) if time is None else time)
+    then = result.at_times(peak_time(result) if time is None else time)
     (section,) = sections(then, azimuth)
     (left, right), (low, high) = limits([section])
     tall = 7.6 if friction_circles else 1.9 + WIDTH * (high - low) / (right - left)

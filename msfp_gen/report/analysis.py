@@ -29,6 +29,7 @@ from msfp_gen.report.frames import picture, render, write_page
 from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of, terms_shown
 from msfp_gen.report.repeated import plot_loops, plot_vertical, repeat_words, repeated, vertical_table
 from msfp_gen.scene.explain import explain
+from msfp_gen.scene.file.loader import bearing_from_table, bearing_tables, parsed_sheet
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.sheet import Sheet
 from msfp_gen.studies.bounding import CASES, SuiteBounds, load_suite_bounds
@@ -197,7 +198,7 @@ def _last_sections(study: Study, bounds: SuiteBounds, rows: Any, scene: Any) -> 
         "documentation says what was compared, and how large the differences were."
     )
     kinds = set(study.table["scene"])  # names of its tables, such as "building"
-    if any("sheet" in given for _, given in _bearings(study.table["scene"])):
+    if any("sheet" in given for given in bearing_tables(study.table["scene"]).values()):
         kinds.add("sheet")
     yield Section("Which parts of the program were compared with what", (words,), [compared_table(kinds)])
     yield Section("Settings", (), [*explain(scene), _files(study)])
@@ -316,13 +317,14 @@ def _reached(rows: Any) -> dict[str, dict[str, Any]]:
 def _bearing_section(study: Study, scene: Any) -> Section:
     """The data sheets of the scene; without one the bearing is among the settings."""
     from msfp_gen.design.sheet import SheetReport
-    from msfp_gen.scene.file.loader import bearing_from_table, parsed_sheet
 
+    scene_table = study.table["scene"]
     tables: list[Table] = []
     figures: list[Captioned] = []
-    for name, given in _bearings(study.table["scene"]):
+    for kind, given in bearing_tables(scene_table).items():
         if "sheet" not in given:
             continue
+        name = kind or str(scene_table.get("name") or "bearing")
         data: Sheet = parsed_sheet(given)
         report = SheetReport(name, data, bearing_from_table(given))
         tables += report.tables
@@ -330,13 +332,6 @@ def _bearing_section(study: Study, scene: Any) -> Section:
         figures.append((caption, plot_sheet(report, table=False)))
     words = () if tables else ("The bearing is given surface by surface: see Settings.",)
     return Section("Bearing", words, tables, figures)
-
-
-def _bearings(table: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Name and table of every kind of bearing of a scene."""
-    if isinstance(one := table.get("bearing"), Mapping):
-        yield str(table.get("name") or "bearing"), one
-    yield from table.get("bearings", {}).items()
 
 
 def _motion_section(study: Study, bounds: SuiteBounds) -> Section:

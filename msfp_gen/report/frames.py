@@ -23,7 +23,6 @@ from msfp_gen.common.version import __version__
 from msfp_gen.figures.style import colour
 from msfp_gen.results.geometry import POINTS, Poses, friction_circles, outline, poses
 from msfp_gen.results.history import History
-from msfp_gen.results.joining import at_times
 from msfp_gen.results.result import Result
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.results.sliding import sliding_surfaces
@@ -46,7 +45,7 @@ def view(result: Result, count: int = FRAMES) -> dict[str, Any]:
     Bodies are solids of revolution; positions are relative to the base, as in `geometry.Poses`. count: of instants,
     about.
     """
-    shown = at_times(result, instants(result, count))
+    shown = result.at_times(instants(result, count))
     history, bearing, where = shown.alone.history, shown.bearing, poses(shown)
     frames = {
         "time": history.time,

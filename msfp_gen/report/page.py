@@ -95,8 +95,7 @@ def summary_page(result: AnyResult) -> list[Table]:
     """Tables of the run as in `msfp-gen run`, without times of the machine, and of the events of one bearing."""
     first, *others = result.tables()
     rows = [("time simulated", f"{result.summary['duration']:.6g} s"), *(row for row in first.rows if row[0] != "time")]
-    events = getattr(result, "events", ())  # a building has the events of its bearings in the notes
-    return [Table("the run", (), rows), *others, *([_event_table(events)] if events else [])]
+    return [Table("the run", (), rows), *others, *([_event_table(result.events)] if result.events else [])]
 
 
 def note_tables(result: AnyResult) -> list[Table]:

@@ -45,7 +45,7 @@ class Poses:
 
 
 def poses(result: Result) -> Poses:
-    """The stack of `result` in every row; `joining.at_times` gives a result with rows at other times."""
+    """The stack of `result` in every row; `Result.at_times` gives one with rows at other times."""
     (scene, history, _), bearing = result.alone, result.bearing
     motion = scene.motion
     base = motion.rotation(np.clip(history.time, 0.0, motion.duration))

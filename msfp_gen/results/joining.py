@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +13,6 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.history import History, quantities
-
-if TYPE_CHECKING:
-    from msfp_gen.results.result import AnyResult
 
 Ends = tuple[History, History]
 
@@ -118,15 +115,8 @@ def concatenated(parts: Sequence[History]) -> History:
     return History(**columns, energy={name: whole([part.energy[name] for part in parts]) for name in parts[0].energy})
 
 
-R = TypeVar("R", bound="AnyResult")
-
-
-def at_times(result: R, times: ArrayLike) -> R:
-    """`result`, of one bearing or of a building, at other times, by linear interpolation between its own rows.
-
-    times: ndarray, shape (K,), or a number [s]. Raises InputError for a time outside the run.
-    """
-    rows: Any = getattr(result, "history", result)  # the result of a building has its rows itself
+def at_times(rows: Any, times: ArrayLike) -> Any:
+    """`rows`, a dataclass with arrays along its field `time` [s], at other times; see `AnyResult.at_times`."""
     new_times = checked_times(rows.time, times)
 
     def at(values: Any) -> Any:
@@ -134,10 +124,7 @@ def at_times(result: R, times: ArrayLike) -> R:
             return {name: at(column) for name, column in values.items()}
         return interpolated(rows.time, values, new_times) if isinstance(values, np.ndarray) else values
 
-    changed = replace(
-        rows, **{field.name: at(getattr(rows, field.name)) for field in fields(rows)} | {"time": new_times}
-    )
-    return changed if rows is result else replace(result, history=changed)  # type: ignore[type-var]
+    return replace(rows, **{field.name: at(getattr(rows, field.name)) for field in fields(rows)} | {"time": new_times})
 
 
 def checked_times(rows: Array, times: ArrayLike) -> Array:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
@@ -26,6 +27,7 @@ from msfp_gen.results.characterise import characterise as characterise_bearing
 from msfp_gen.results.files import Storage, read_result
 from msfp_gen.results.gradients import Gradients
 from msfp_gen.results.history import BearingRows, Counters, Event, Extremes, History
+from msfp_gen.results.joining import at_times
 from msfp_gen.results.note import DECISIVE, Note, by_importance
 from msfp_gen.results.summary import (
     rows_of_bearing,
@@ -33,6 +35,7 @@ from msfp_gen.results.summary import (
     summarise_gradients,
     summary_of_bearing,
     surface_table,
+    time_row,
     transition_table,
     work_rows,
 )
@@ -139,6 +142,23 @@ class AnyResult(Printed):
         """Counters of the work of the solver, and wall_time [s]."""
 
     @property
+    def events(self) -> tuple[Event, ...]:
+        """The events that the run located; () where it locates none, as below a building, whose notes have them."""
+        return ()
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether this is one bearing that was run alone, whose rows have angles, slips and energies of its parts."""
+        return False
+
+    @abstractmethod
+    def at_times(self, times: ArrayLike) -> Self:
+        """The result with rows at other times, by linear interpolation between its own rows.
+
+        times: ndarray, shape (K,), or a number [s]. Raises InputError for a time outside the run.
+        """
+
+    @property
     @abstractmethod
     def compared(self) -> dict[str, Array]:
         """The histories by which runs are compared: quantity -> ndarray, shape (k, places, components) [SI]."""
@@ -227,7 +247,8 @@ class Mounting:
 
     number: of the bearing, from 1. label: its number and name, for messages. effects: of its model at the start.
     axial_load: compression at rest [N]. interface: between bearing and building. summary: what the summary of a bearing
-    has of the building.
+    has of the building. place_row, load_row: label and value, for tables, of its place in plan and of its axial force
+    over the load at rest.
     """
 
     number: int
@@ -237,6 +258,8 @@ class Mounting:
     axial_load: float
     interface: Any
     summary: Mapping[str, Any]
+    place_row: tuple[str, str]
+    load_row: tuple[str, str]
 
 
 class Alone(NamedTuple):
@@ -313,6 +336,11 @@ class Result(AnyResult):
         )
 
     @property
+    def is_alone(self) -> bool:
+        """Whether the bearing was run alone, without a building."""
+        return self.mounting is None
+
+    @property
     def number(self) -> int:
         """Number of the bearing below a building, from 1; 0: the bearing is alone."""
         return 0 if self.mounting is None else self.mounting.number
@@ -353,6 +381,10 @@ class Result(AnyResult):
     def work(self) -> Mapping[str, float]:
         """Counters of the work of the solver, and wall_time [s]; {} below a building, whose result has them."""
         return {} if self.counters is None else asdict(self.counters)
+
+    def at_times(self, times: ArrayLike) -> Self:
+        """The result with rows at other times: see `AnyResult.at_times`."""
+        return replace(self, history=at_times(self.history, times))
 
     @property
     def compared(self) -> dict[str, Array]:
@@ -415,7 +447,9 @@ class Result(AnyResult):
 
     def main_results(self) -> Rows:
         """Label and value of the main results."""
-        return rows_of_bearing(self.summary)
+        if self.mounting is None:
+            return rows_of_bearing(self.summary, time_row(self.summary))
+        return rows_of_bearing(self.summary, self.mounting.place_row, [self.mounting.load_row])
 
     @property
     def curve(self) -> Curve:

@@ -33,7 +33,7 @@ def is_monotonic(result: Result) -> bool:
 
     Never for a bearing below a building, whose first contacts of rims are not located.
     """
-    if result.number:
+    if not result.is_alone:
         return False
     if result.scene.motion.metadata.get("source") == "ramp":
         return True
@@ -228,11 +228,13 @@ def uplift_of(one: Result) -> dict[str, Any]:
     return {"height": height, "duration": duration, "count": max(len(spells), int(height > 0))}
 
 
-def rows_of_bearing(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Label and value of the main results in the summary of a bearing."""
-    below = "position" in summary  # of a building
-    about = _place_row(summary) if below else time_row(summary)
-    loads = [("N over N at rest", ratios_text(summary))] if below else []
+def rows_of_bearing(
+    summary: Mapping[str, Any], about: tuple[str, str], loads: Sequence[tuple[str, str]] = ()
+) -> list[tuple[str, str]]:
+    """Label and value of the main results in the summary of a bearing.
+
+    about: the first row, of the run or of the place of the bearing. loads: rows after the forces.
+    """
     ratio = "" if summary["peak_force_ratio"] is None else f" ({summary['peak_force_ratio']:.3f} of the axial load)"
     at = {key: f" at {times['radial']:.4g} s" for key, times in summary["times"].items() if isinstance(times, Mapping)}
     whole = [
@@ -241,7 +243,7 @@ def rows_of_bearing(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("peak force", _along(summary["peak_force"], 1e-3, "kN", at["peak_force"]) + ratio),
     ]
     if "peak_sliding" not in summary:  # of one pendulum in place of the stack
-        return whole + loads
+        return [*whole, *loads]
     least, most = min(summary["minimum_normal_force"]), max(summary["maximum_normal_force"])
     return [
         *whole,
@@ -249,11 +251,6 @@ def rows_of_bearing(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("normal force", f"{1e-3 * least:.4g} to {1e-3 * most:.4g} kN"),
         *loads,
     ]
-
-
-def _place_row(summary: Mapping[str, Any]) -> tuple[str, str]:
-    x, y = summary["position"]
-    return "bearing", f"{summary['layout']} at ({x:g}, {y:g}) m"
 
 
 def ratios_text(summary: Mapping[str, Any], to: str = " to ") -> str:

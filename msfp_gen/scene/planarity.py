@@ -7,7 +7,7 @@ rotation or moment about a horizontal axis a, the horizontal direction of tiltin
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, pi
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError
 from msfp_gen.common.later import kept
 from msfp_gen.motions import piecewise
 from msfp_gen.motions.motion import Motion
@@ -82,6 +83,18 @@ def scene_plane(scene: SceneFields) -> tuple[float, float, str]:
         if end < until:
             until, name = end, part.name
     return scene_azimuth or 0.0, until, name
+
+
+def along(motion: Motion, axis: int) -> Motion:
+    """The motion with its vertical channel and the horizontal one of an axis, 0 or 1.
+
+    Raises InputError for a base that rotates.
+    """
+    if np.any(motion.coefficients[:, 3:]):
+        raise InputError("motion: a base that rocks about both axes cannot be split by axis; use the spatial model")
+    coefficients = motion.coefficients.copy()
+    coefficients[:, 1 - axis] = 0.0
+    return replace(motion, coefficients=coefficients)
 
 
 def plane_inputs(scene: SceneFields) -> Iterator[PlaneInput]:

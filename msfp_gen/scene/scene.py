@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -16,9 +17,9 @@ from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.motions.time_grid import TIME_TOLERANCE
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection, load_at_rest, select_effects
-from msfp_gen.scene.effect_switching import all_effects
+from msfp_gen.scene.effect_switching import all_effects, check
 from msfp_gen.scene.friction_parameters import bearing_for, check_bearing
-from msfp_gen.scene.planarity import scene_plane
+from msfp_gen.scene.planarity import along, scene_plane
 from msfp_gen.scene.scene_fields import InitialState, Limits, SceneFields, Stop
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_seats, check_standing, standing_of
@@ -119,6 +120,17 @@ class Scene(Printed, SceneFields):
         return (self.bearing,)
 
     @property
+    def longest_row_step(self) -> tuple[float, str]:
+        """Longest time between two rows [s], infinite where nothing limits it, and the field that limits it."""
+        if self.output_step is not None:
+            return self.output_step, "output_step"
+        return self.solver.max_step or math.inf, "solver.max_step"
+
+    def check_method(self) -> None:
+        """Raise InputError where the method does not support the effects at the start of the run."""
+        check(self, self.modelled)
+
+    @property
     def modelled(self) -> Effects:
         """The effects at the start of the run: as given, or selected from the scene."""
         return self.effect_selection.effects
@@ -154,6 +166,12 @@ class Scene(Printed, SceneFields):
         scene = replace(self, effects=replace(effects, error=min(effects.error, error / 2)))
         reasons = scene.effect_selection.reasons
         return scene, "; ".join(f"{reason.effect} = {reason.chosen}: {reason.because}" for reason in reasons)
+
+    def along_axes(self) -> tuple[Self, ...]:
+        """The scene; where its motion leaves any vertical plane, one for each horizontal axis. Raises InputError."""
+        if self.motion.plane() is not None:
+            return (self,)
+        return tuple(replace(self, motion=along(self.motion, axis), motion_table=None) for axis in (0, 1))
 
     @property
     def loads_at_rest(self) -> tuple[float, ...]:

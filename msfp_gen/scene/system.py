@@ -6,6 +6,7 @@ knows the scene of one bearing, and calls the method of the same name of any oth
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -68,6 +69,13 @@ class System(Protocol):
     def run_options(self) -> frozenset[str]:
         """Names of the options of `simulate` that a run has, beside progress and checkpoints."""
 
+    @property
+    def longest_row_step(self) -> tuple[float, str]:
+        """Longest time between two rows [s], infinite where their memory is not counted, and the field that says so."""
+
+    def check_method(self) -> None:
+        """Raise InputError where the method does not run the effects with which the system starts."""
+
     def with_bearings(self, change: Callable[[Bearing, Law | None], Bearing]) -> Self:
         """It with every bearing changed."""
 
@@ -87,6 +95,9 @@ class System(Protocol):
     @property
     def rows_between_steps(self) -> bool:
         """Whether rows at even times are interpolated, so that `output_step` leaves the steps as they are."""
+
+    def along_axes(self) -> tuple[Self, ...]:
+        """It as planar models run it: itself, or one for each horizontal axis of its motion. Raises InputError."""
 
     @property
     def own_motions(self) -> tuple[str, ...]:
@@ -114,6 +125,7 @@ class OtherSystem(ABC):
 
     run_options: ClassVar[frozenset[str]] = frozenset()
     rows_between_steps: ClassVar[bool] = False
+    longest_row_step: ClassVar[tuple[float, str]] = (math.inf, "")  # rows of other systems are few
     own_motions: Any = ()  # a property of buildings
     name: Any
 
@@ -128,6 +140,13 @@ class OtherSystem(ABC):
     @abstractmethod
     def start(self, **options: Any) -> Any:
         """The run before its first step; see `simulation.system.Run`. Raises InputError, RunError."""
+
+    def check_method(self) -> None:  # noqa: B027 - other systems check it at their start
+        """Raise InputError where the method does not run the effects."""
+
+    def along_axes(self) -> tuple[Any, ...]:
+        """It as planar models run it: itself."""
+        return (self,)
 
     def explain(self) -> list[Any]:
         """Tables that describe it; see `scene.explain.explain`."""
@@ -201,6 +220,7 @@ class Kind:
         presets: folder of TOML files with systems of this kind; None: there are none.
         result: gives the class of their results, for files of results; None: there are no such files.
         written_out: the table `key` with what it abbreviates written out, to which paths of fields refer.
+        named: the table of a file that has bearings by name, to which its rows refer; None: there is none.
     """
 
     key: str
@@ -210,6 +230,7 @@ class Kind:
     presets: Traversable | None = None
     result: Callable[[], Any] | None = None
     written_out: Callable[[SceneTable], SceneTable] = lambda table: table
+    named: str | None = None
 
 
 def is_system(value: object) -> bool:

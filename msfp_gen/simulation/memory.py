@@ -15,7 +15,6 @@ from pathlib import Path
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.history import ENERGY, LABELS, STACK, quantities
-from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import System
 
 VARIABLE = "MSFP_GEN_MEMORY"  # environment variable: memory that this process may use [GB]
@@ -32,18 +31,19 @@ def require_memory(systems: Sequence[System]) -> None:
     longest step, which gives the least number of rows; without that they are not counted, since their steps are not
     known before.
     """
-    scenes = [system for system in systems if isinstance(system, Scene)]
-    counted = [scene for scene in scenes if _row_step(scene) < math.inf]
+    counted = [system for system in systems if system.longest_row_step[0] < math.inf]
     needed = sum(map(_needed, counted))
     _of_variable()  # a wrong one is refused, however few rows there are
     if needed <= SMALL or needed <= (room := available()):
         return
     worst = max(counted, key=_needed)
-    step = _row_step(worst)
-    runs = f"{len(scenes)} runs" if len(scenes) > 1 else f"{worst.end / step:.1e} rows"
+    step, field = worst.longest_row_step
+    enough = 1.05 * step * (needed / max(room, SMALL))  # more than the rounding of the message
+    runs = f"{len(systems)} runs" if len(systems) > 1 else f"{worst.end / step:.1e} rows"
+    remedy = f"give {'' if field == 'output_step' else 'an output_step of '}at least {enough:.2g} [s]"
     raise InputError(
-        f"{_named(worst)}: {runs} need {needed / GB:.3g} GB of memory and {max(room, 0.0) / GB:.3g} GB are available; "
-        f"{_remedy(worst, needed / max(room, SMALL))}, or a shorter duration"
+        f"{field} = {step:g}: {runs} need {needed / GB:.3g} GB of memory and {max(room, 0.0) / GB:.3g} GB are "
+        f"available; {remedy}, or a shorter duration"
     )
 
 
@@ -70,25 +70,10 @@ def available() -> float:
     return min(_of_machine(), _of_group(), _of_process(), _of_variable())
 
 
-def _needed(scene: Scene) -> float:
-    """Memory for the rows of a scene that are known before [bytes]."""
-    return COPIES * (1 + scene.end / _row_step(scene)) * row_size(scene.bearing.layout.surfaces)
-
-
-def _row_step(scene: Scene) -> float:
-    """Longest time between two rows [s]; infinite where nothing limits it."""
-    return scene.output_step or scene.solver.max_step or math.inf
-
-
-def _named(scene: Scene) -> str:
-    name = "solver.max_step" if scene.output_step is None else "output_step"
-    return f"{name} = {_row_step(scene):g}"
-
-
-def _remedy(scene: Scene, excess: float) -> str:
-    """The remedy for rows that need `excess` times the room."""
-    enough = 1.05 * _row_step(scene) * excess  # more than the rounding of the message
-    return f"give {'an output_step of ' if scene.output_step is None else ''}at least {enough:.2g} [s]"
+def _needed(system: System) -> float:
+    """Memory for the rows of a system that are known before [bytes]."""
+    size = sum(row_size(bearing.layout.surfaces) for bearing in system.every_bearing)
+    return COPIES * (1 + system.end / system.longest_row_step[0]) * size
 
 
 def _of_machine() -> float:

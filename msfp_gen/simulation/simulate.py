@@ -10,7 +10,6 @@ from typing import Any, overload
 from msfp_gen.common.aliases import Progress
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.results.result import Result
-from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.system import System, is_system
 from msfp_gen.simulation.bearing_run import start_bearing
@@ -141,9 +140,3 @@ def start(system: Any, **options: Any) -> Run:
 
 
 start.register(Scene, start_bearing)
-
-
-def check_method(system: System) -> None:
-    """Raise InputError where the method does not run the effects; other systems check theirs at their start."""
-    if isinstance(system, Scene):
-        check(system, system.modelled)

@@ -358,7 +358,6 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-WHOLE = ("building", "bearings")  # tables that a scene of a building reads together; tables of other kinds too
 INTENSITY = "intensity"  # column of the intensity measure of [records]
 
 
@@ -417,7 +416,7 @@ class SceneFactory:
             if axis.change == "sets"
         )
         self._table = base
-        shared = {field.name for field in fields(SceneFields)} - set(WHOLE)
+        shared = {field.name for field in fields(SceneFields)}  # the tables of other kinds are read with every scene
         self._parts = {
             field.name: getattr(self.base, field.name) for field in fields(self.base) if field.name in shared
         }

@@ -11,7 +11,7 @@ from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.model.model import build_model, working_time
 from msfp_gen.scene.system import System, is_system
 from msfp_gen.simulation.memory import require_memory
-from msfp_gen.simulation.simulate import check_method, integrate
+from msfp_gen.simulation.simulate import integrate
 from msfp_gen.studies.workers import SharedProgress, local_pool, proceed, worker_count
 
 Proceed = Callable[[float, float], None]  # (simulated time, end), or (share done, 1)
@@ -84,7 +84,7 @@ def completed_runs(
     labels = [scene.name for scene in scenes] if labels is None else labels
     for label, scene in zip(labels, scenes, strict=True):
         with _located(label):
-            check_method(scene)
+            scene.check_method()
             if strict and "strict" not in scene.run_options:
                 raise InputError("strict: only runs of one bearing have it; leave it out")
     report = None if progress is None else SharedProgress(len(scenes), progress).of

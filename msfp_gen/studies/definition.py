@@ -30,7 +30,6 @@ from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.scene.file.loader import Suite, load_suite, scene_table, suite_from_table, toml_file
 from msfp_gen.scene.file.source import with_absolute_paths
 from msfp_gen.scene.system import System
-from msfp_gen.simulation.simulate import check_method
 from msfp_gen.studies.axes import (
     INTENSITY,
     Axis,
@@ -307,7 +306,7 @@ def _scene_and_files(factory: SceneFactory, values: Sequence[Any], where: str) -
     with prefixed(f"{where}: "):
         with recording() as files:
             scene = factory.scene(values)
-        check_method(scene)
+        scene.check_method()
     return scene, files
 
 

@@ -33,7 +33,6 @@ from msfp_gen.common.version import __version__
 from msfp_gen.jit.cache import digest_sources
 from msfp_gen.scene.file.loader import dumps, toml_file
 from msfp_gen.scene.plausibility import require_meant
-from msfp_gen.simulation.simulate import check_method
 from msfp_gen.studies.axes import INTENSITY, SceneFactory, StudyInputs
 from msfp_gen.studies.batch import (
     BAD_INPUT,
@@ -225,7 +224,7 @@ def _row(make: Callable[[], System], job: ChunkJob, at: dict[str, float]) -> tup
     """Status, message and kept columns of one run. make: makes its scene. at: numbers of the axes, for formulas."""
     try:
         scene = make()
-        check_method(scene)
+        scene.check_method()
         result = run_to_end(scene, seconds=job.run_seconds)
     except InputError as error:
         return BAD_INPUT, str(error), {}

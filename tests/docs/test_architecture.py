@@ -38,16 +38,18 @@ GUESTS = {
     "cli": {"auditing", "design", "embedding", "figures", "report", "studies"},
 }
 
-# Functions outside `buildings` that ask whether they have the scene or the result of one bearing, each with its reason.
+# What systems, their results, rows and characterisations derive from.
+ROOTS_OF_KINDS = {"System", "OtherSystem", "SceneFields", "AnyResult", "Mounting", "BearingRows", "Characterisation"}
+# Fields, keys of summaries, and tables of scene files that some kinds have and others have not.
+KEYS_OF_KINDS = {"position", "bearings", "building", "mounting", "history", "events"}
+# Functions outside `buildings` that ask for a kind by such a class or key, each with its reason.
 KIND_SWITCHES = {
     "scene.file.source.load_bearing_scene": "states that a scene of one bearing is wanted",
-    "simulation.memory.require_memory": "rows of other systems are few",
-    "simulation.simulate.check_method": "other systems check their method at their start",
     "studies.accuracy.timed_run.require_base_motion_only": "states that a method runs one bearing alone",
-    "studies.accuracy.methods._with_effects": "one planar model for each axis combines histories of one bearing",
     "auditing.stated.stated_of": "states that a check is of one bearing",
+    "cli.console.is_result": "the source of a command is a result or a scene",
+    "auditing.momentum.momentum": "the position of a mass, in a table of any program",
 }
-KINDS_OF_SYSTEMS = {"Scene", "BuildingScene", "Result", "BuildingResult"}
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 BROUGHT = {"markupsafe": "jinja2", "PIL": "matplotlib"}  # what a dependency requires itself
@@ -172,19 +174,92 @@ def test_the_diagram_of_the_packages_has_their_imports():
     assert {(package, other) for package, others in GUESTS.items() for other in others} <= drawn
 
 
+def classes_of_kinds():
+    """Name -> folder of every class of a system, a result, its rows or its characterisation."""
+    nodes = [(path.parent, node) for path in MODULES.values() for node in ast.walk(tree_of(path))]
+    defined = {node.name: (folder, node.bases) for folder, node in nodes if isinstance(node, ast.ClassDef)}
+    found = set(ROOTS_OF_KINDS)
+    while more := {name for name, (_, bases) in defined.items() if found & set(map(ast.unparse, bases))} - found:
+        found |= more
+    return {name: defined[name][0] for name in found}
+
+
+def classes_asked(node):
+    """Names of the classes that a call, a comparison of types or a pattern asks for."""
+    match node:
+        case ast.Call(func=ast.Name("isinstance" | "issubclass"), args=[_, kinds]):
+            asked = [kinds]
+        case ast.Compare() if "type(" in ast.unparse(node):
+            asked = [node.left, *node.comparators]
+        case ast.MatchClass():
+            asked = [node.cls]
+        case _:
+            asked = []
+    return {getattr(part, "id", getattr(part, "attr", "")) for one in asked for part in ast.walk(one)}
+
+
+def keys_asked(node):
+    """Texts for which a call asks whether something has them, or with which an expression is compared."""
+    match node:
+        case ast.Call(func=ast.Name("getattr" | "hasattr") | ast.Attribute(attr="get"), args=asked):
+            pass
+        case ast.Compare():
+            asked = [node.left, *node.comparators]
+        case ast.MatchValue():
+            asked = [node.value]
+        case _:
+            asked = []
+    parts = [part for one in asked for part in (one.elts if isinstance(one, ast.Tuple | ast.List | ast.Set) else [one])]
+    return {part.value for part in parts if isinstance(part, ast.Constant)}
+
+
+def places_that_ask(node, classes, place="<module>"):
+    """The functions, by name, in which something asks for one of these classes or for a key of a kind."""
+    place = node.name if isinstance(node, ast.FunctionDef) else place
+    if classes_asked(node) & classes or keys_asked(node) & KEYS_OF_KINDS:
+        yield place
+    for inner in ast.iter_child_nodes(node):
+        yield from places_that_ask(inner, classes, place)
+
+
 def test_few_functions_ask_for_the_kind_of_a_system():
-    """What a system or a result can do stands in its class, or in functions that kinds register for."""
-    found = set()
+    """What a system or a result can do stands in its class, in its `Kind`, or in functions that kinds register for."""
+    found, classes = set(), classes_of_kinds()
+    assert {"Scene", "BuildingScene", "Result", "BuildingResult", "History", "BuildingCharacterisation"} <= set(classes)
     for name, path in MODULES.items():
-        if name.startswith("msfp_gen.buildings") or name.count(".") < 2:
-            continue
-        for function in (node for node in ast.walk(tree_of(path)) if isinstance(node, ast.FunctionDef)):
-            calls = (node for node in ast.walk(function) if isinstance(node, ast.Call) and len(node.args) == 2)
-            asked = (call.args[1] for call in calls if ast.unparse(call.func) in ("isinstance", "issubclass"))
-            names = {node.id for kind in asked for node in ast.walk(kind) if isinstance(node, ast.Name)}
-            if names & KINDS_OF_SYSTEMS:
-                found.add(f"{name.removeprefix('msfp_gen.')}.{function.name}")
+        if not name.startswith("msfp_gen.buildings"):
+            others = {kind for kind, folder in classes.items() if folder != path.parent}
+            inside = name.removeprefix("msfp_gen.")
+            found |= {f"{inside}.{place}" for place in places_that_ask(tree_of(path), others)}
     assert found == set(KIND_SWITCHES)
+
+
+def test_what_a_building_says_of_its_bearings_stays_in_the_results():
+    """Others ask a result for what it has."""
+    for name, path in MODULES.items():
+        if not name.startswith(("msfp_gen.buildings", "msfp_gen.results")):
+            assert ".mounting" not in path.read_text(encoding="utf-8"), name
+
+
+SWITCHES = """
+def _(result):
+    isinstance(result, (Result, int))
+    type(result) is Result
+    issubclass(result, results.Result)
+    "position" in result
+    result.get("bearings")
+    getattr(result, "history", result)
+    match result:
+        case Result():
+            pass
+        case "building":
+            pass
+"""
+
+
+def test_the_reader_of_switches_sees_them():
+    assert list(places_that_ask(ast.parse(SWITCHES), {"Result"})) == ["_"] * 8
+    assert not list(places_that_ask(ast.parse("result.history == Result(1)\nresult['position']"), {"Result"}))
 
 
 def test_a_run_loads_the_core_alone():

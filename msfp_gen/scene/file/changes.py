@@ -12,7 +12,7 @@ from msfp_gen.common.aliases import SceneTable
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, number_and_unit, ruled_fields
 from msfp_gen.scene.bearing import Body, Surface
-from msfp_gen.scene.file.loader import MAX_DEPTH, complete_bearing, complete_part
+from msfp_gen.scene.file.loader import MAX_DEPTH, complete_bearing, complete_part, named_bearings
 from msfp_gen.scene.file.schema import SCENE
 from msfp_gen.scene.system import kinds
 
@@ -158,8 +158,7 @@ def _rows(inner: Any, index: int | None) -> list[int]:
 def _own_bearing(walk: _Walk, bearing: Any, following: Key) -> Any:
     """A bearing as a table that can be changed; complete where a row of its surfaces or bodies is."""
     if isinstance(bearing, str):
-        named = walk.root.get("bearings", {})
-        bearing = named[bearing] if isinstance(named, dict) and bearing in named else {"preset": bearing}
+        bearing = named_bearings(walk.root).get(bearing, {"preset": bearing})
     if isinstance(bearing, str):
         bearing = {"preset": bearing}
     if isinstance(bearing, dict) and (walk.complete or (following in ROWS and "preset" in bearing)):

@@ -39,6 +39,7 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Limits, Stop
 from msfp_gen.scene.sheet import Sheet
 from msfp_gen.scene.solver import Solver
+from msfp_gen.scene.system import kinds
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, Top
 from msfp_gen.specification.layout import SELECTABLE, Auto, Effects, Layout
 
@@ -131,6 +132,20 @@ def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
     return _bearing(schema.validate_part("bearing", table))
 
 
+def named_bearings(table: Mapping[str, Any]) -> SceneTable:
+    """The bearings that the table of a scene file has by name: name -> table, or the name of a preset."""
+    if table.keys() <= schema.SCENE.keys.keys():  # of one bearing, whose file loads no kinds
+        return {}
+    named = (table.get(kind.named) for kind in kinds().values() if kind.named is not None)
+    return {name: bearing for one in named if isinstance(one, Mapping) for name, bearing in one.items()}
+
+
+def bearing_tables(table: Mapping[str, Any]) -> SceneTable:
+    """The tables of bearings in the table of a scene file: "" -> `[bearing]`, then by name."""
+    found = {"": table.get("bearing"), **named_bearings(table)}
+    return {name: one for name, one in found.items() if isinstance(one, Mapping)}
+
+
 def load_sheet(source: str | Path, kind: str | None = None) -> tuple[str, Sheet, Bearing]:
     """Name, data sheet and bearing of a TOML file, of a scene or alone, with `[bearing.sheet]` or the sheets of a
     building.
@@ -142,9 +157,7 @@ def load_sheet(source: str | Path, kind: str | None = None) -> tuple[str, Sheet,
         if not is_input(path):
             raise InputError("no such file; give a TOML file with [bearing.sheet]")
         table = toml_file(path)
-        of_building = table.get("bearings")
-        kinds = {"": table.get("bearing"), **(of_building if isinstance(of_building, dict) else {})}
-        found = {name: one for name, one in kinds.items() if isinstance(one, dict) and "sheet" in one}
+        found = {name: one for name, one in bearing_tables(table).items() if "sheet" in one}
         if not found:
             raise InputError("bearing.sheet is missing: give the data sheet of the bearing (docs/bearing.md)")
         if (len(found) > 1) if kind is None else (kind not in found):

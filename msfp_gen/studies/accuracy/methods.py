@@ -17,8 +17,6 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.model.model import build_model
-from msfp_gen.motions.motion import Motion
-from msfp_gen.scene.scene import Scene
 from msfp_gen.studies.accuracy.series import run_opensees, run_series
 from msfp_gen.studies.accuracy.timed_run import (
     CUT_OFF,
@@ -33,6 +31,7 @@ from msfp_gen.studies.accuracy.timed_run import (
 
 if TYPE_CHECKING:
     from msfp_gen.model.model import Ode
+    from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.system import System
 
 FIRST_STEP = 1e-4  # [s], as in the runtime; some integrators choose a first step that leaves the range of the model
@@ -213,16 +212,15 @@ def _with_effects(changes: dict[str, Any], scene: System, rtol: float, limit: fl
     """Run the scene by the default method with other effects."""
     if all(getattr(effects, name) == value for effects in scene.every_effects for name, value in changes.items()):
         raise InputError(f"the scene itself has {', '.join(f'{name} = {value!r}' for name, value in changes.items())}")
-    if isinstance(scene, Scene) and changes.get("dimension") == "planar" and scene.motion.plane() is None:
-        return _axis_by_axis(changes, scene, rtol, limit)
-    return run_native("implicit", scene.with_effects(**changes), rtol, limit)
+    scenes = scene.along_axes() if changes.get("dimension") == "planar" else (scene,)
+    return _combined([run_native("implicit", one.with_effects(**changes), rtol, limit) for one in scenes])
 
 
-def _axis_by_axis(changes: dict[str, Any], scene: Scene, rtol: float, limit: float) -> Trial:
-    """Run a motion in two directions by one planar model for each horizontal axis, uncoupled, and combine them."""
-    motions = (_along(scene.motion, axis) for axis in (0, 1))
-    planar = (replace(scene, motion=motion, motion_table=None).with_effects(**changes) for motion in motions)
-    along_x, along_y = (run_native("implicit", axis_scene, rtol, limit) for axis_scene in planar)
+def _combined(trials: list[Trial]) -> Trial:
+    """One run, or the uncoupled runs of one bearing along both horizontal axes as one."""
+    if len(trials) == 1:
+        return trials[0]
+    along_x, along_y = trials
     worse = max(along_x, along_y, key=lambda trial: not trial.finished)
     rows = min(along_x.rows, along_y.rows)
     x, y = ({name: values[:rows, :, 0] for name, values in one.histories.items()} for one in (along_x, along_y))
@@ -238,15 +236,6 @@ def _axis_by_axis(changes: dict[str, Any], scene: Scene, rtol: float, limit: flo
         if rows
         else {},
     )
-
-
-def _along(motion: Motion, axis: int) -> Motion:
-    """The motion with its vertical channel and one horizontal channel. Raises InputError for a base that rotates."""
-    if np.any(motion.coefficients[:, 3:]):
-        raise InputError("motion: a base that rocks about both axes cannot be split by axis; use the spatial model")
-    coefficients = motion.coefficients.copy()
-    coefficients[:, 1 - axis] = 0.0
-    return replace(motion, coefficients=coefficients)
 
 
 # Simplified models.

@@ -25,7 +25,6 @@ from msfp_gen.report import write_report
 from msfp_gen.results.characterise import characterised, csv_rows
 from msfp_gen.results.files import table_of
 from msfp_gen.results.history import ENERGY_BELOW
-from msfp_gen.results.joining import at_times
 from msfp_gen.results.loops import ForcePath as Motions
 from msfp_gen.results.note import Note
 from msfp_gen.results.quantities import quantities
@@ -328,7 +327,7 @@ def test_motions_of_supports_come_back_from_a_file(tmp_path: Path):
 
 def test_a_bearing_at_other_times():
     one = pushed().bearings[1]
-    between = at_times(one, 0.5 * (one.history.time[3] + one.history.time[4]))
+    between = one.at_times(0.5 * (one.history.time[3] + one.history.time[4]))
     assert between.label == one.label and between.history.displacement.shape == (1, 3)
     np.testing.assert_allclose(between.history.displacement[0], one.history.displacement[3:5].mean(axis=0), rtol=1e-12)
     np.testing.assert_allclose(between.history.sliding[0], one.history.sliding[3:5].mean(axis=0), rtol=1e-12)
@@ -338,7 +337,7 @@ def test_bearings_of_a_building_at_other_times_keep_their_displacement():
     """It is that since the start of the run, not since the first of the times."""
     building = pushed()
     rows = [5, 9]
-    shown = at_times(building, building.time[rows])
+    shown = building.at_times(building.time[rows])
     for one, then in zip(building.bearings, shown.bearings, strict=True):
         assert then.history.displacement == pytest.approx(one.history.displacement[rows], abs=1e-15)
         assert np.abs(then.history.displacement[0]).max() > 1e-4

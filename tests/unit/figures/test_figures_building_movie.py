@@ -15,7 +15,6 @@ from msfp_gen.buildings.figures import MovingFrame
 from msfp_gen.buildings.movie import Elevation, building_film
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import animate, movie
-from msfp_gen.results.joining import at_times
 
 TIMES = np.array([0.1, 0.355, 0.6])
 
@@ -30,17 +29,17 @@ def result() -> BuildingResult:
 
 
 def test_rows_between_rows():
-    shown, time = at_times(result(), TIMES), result().time
+    shown, time = result().at_times(TIMES), result().time
     assert isinstance(shown, BuildingResult) and np.array_equal(shown.time, TIMES)
     wanted = np.interp(TIMES, time, result().axial_force[:, 2])
     assert shown.axial_force[:, 2] == pytest.approx(wanted) and shown.bearings[3].history.sliding.shape == (3, 4)
     with pytest.raises(InputError, match=r"time = 0\.9 s: the run holds 0 to 0\.8 s"):
-        at_times(result(), [0.1, 0.9])
+        result().at_times([0.1, 0.9])
 
 
 def test_the_frame_stands_on_its_bearings():
     """Slab and bearings are placed by different ways: rotations of a node, and rows of attachments."""
-    shown = MovingFrame(at_times(result(), TIMES), 20.0)
+    shown = MovingFrame(result().at_times(TIMES), 20.0)
     below = shown.points(0, shown.upper_ends)
     assert below == pytest.approx(shown.uppers, abs=1e-12)
     moved = shown.uppers[:, 1] - shown.upper_ends[1]
@@ -54,7 +53,7 @@ def test_the_frame_stands_on_its_bearings():
 
 
 def test_elevations_see_what_is_across_them():
-    shown = MovingFrame(at_times(result(), TIMES), 20.0)
+    shown = MovingFrame(result().at_times(TIMES), 20.0)
     along, across = Elevation(shown, 0.0), Elevation(shown, np.pi / 2)
     assert along.uppers[..., 0] == pytest.approx(shown.uppers[..., 0])
     assert across.uppers[..., 0] == pytest.approx(shown.uppers[..., 1])
@@ -63,7 +62,7 @@ def test_elevations_see_what_is_across_them():
 
 
 def test_states_of_bearings():
-    given = at_times(result(), TIMES)
+    given = result().at_times(TIMES)
     wrench = given.wrench.copy()
     wrench[1, 2, 1, 2] = -1e-3 * made().axial_loads[2]
     sliding = given.sliding.copy()
@@ -89,7 +88,7 @@ def test_a_building_of_matrices_shows_nodes_and_links(tmp_path):
     slab = frame()
     whole = Building.from_matrices(slab.mass, slab.damping, slab.stiffness, nodes={"base": (range(6), (0.0, 0.0, 0.0))})
     found = replace(result(), scene=replace(given, building=whole))
-    shown = MovingFrame(at_times(found, TIMES), 5.0)
+    shown = MovingFrame(found.at_times(TIMES), 5.0)
     assert shown.members.shape == (3, 4, 2, 3)
     assert shown.members[:, :, 1] == pytest.approx(shown.uppers)
     path, told = tmp_path / "m.gif", []

@@ -17,7 +17,6 @@ from msfp_gen.figures.section import peak_time
 from msfp_gen.figures.style import engineering
 from msfp_gen.results.geometry import azimuth_of, friction_circles, sections
 from msfp_gen.results.history import ENERGY
-from msfp_gen.results.joining import at_times
 
 PNG = b"\x89PNG"
 RUNS = ("fenz-test5", "becker-circle-125", "unusual-tfp")
@@ -26,7 +25,7 @@ MILLI = 1e3
 
 @cache
 def cut_at(name, time, azimuth=None):
-    (section,) = sections(at_times(preset_run(name), time), azimuth)
+    (section,) = sections(preset_run(name).at_times(time), azimuth)
     return section
 
 
@@ -134,12 +133,12 @@ def test_friction_circles_are_drawn_on_request():
 
 def test_the_plane_follows_the_displacement_or_the_azimuth():
     run = preset_run("becker-circle-125")
-    then = at_times(run, 90.0)
+    then = run.at_times(90.0)
     assert azimuth_of(then) == pytest.approx(
         np.arctan(then.history.displacement[0, 1] / then.history.displacement[0, 0])
     )
     assert sections(then, 0.5)[0].azimuth == 0.5
-    assert -np.pi / 2 < azimuth_of(at_times(run, 120.0)) <= np.pi / 2
+    assert -np.pi / 2 < azimuth_of(run.at_times(120.0)) <= np.pi / 2
 
 
 @pytest.mark.parametrize("draw", [plot_section, plot_force_path])

@@ -16,7 +16,6 @@ from msfp_gen.figures import animate, plot_force_path, plot_section
 from msfp_gen.figures.bearing import draw_bars, eccentricity
 from msfp_gen.report.frames import STATES, instants, view
 from msfp_gen.results.geometry import poses, sections
-from msfp_gen.results.joining import at_times
 from msfp_gen.results.sliding import sliding_surfaces
 
 SMOOTH = 1e-3  # friction so small that the footprint of the seat is the slider's face
@@ -32,7 +31,7 @@ def hop():
 def highest():
     """The hop with one row, where its top surface is open furthest."""
     history = hop().history
-    return at_times(hop(), history.time[int(history.lift[:, 3].argmax())])
+    return hop().at_times(history.time[int(history.lift[:, 3].argmax())])
 
 
 def test_top_moves_by_the_recorded_displacement_in_flight_too():
@@ -60,7 +59,7 @@ def test_drawn_gap_is_the_recorded_lift(surface):
     The lift is that of the tangent plane (docs/uplift.md): the sphere differs by at most delta^2/(2 R).
     """
     history, bearing = hop().history, hop().scene.bearing
-    then = at_times(hop(), history.time[int(history.lift[:, surface].argmax())])
+    then = hop().at_times(history.time[int(history.lift[:, surface].argmax())])
     (section,), seen, sign = sections(then, 0.0), poses(then), bearing.layout.signs[surface]
     radius = bearing.surfaces[surface].radius
     if sign > 0:
@@ -102,7 +101,7 @@ def test_report_says_separated_where_a_surface_is_open():
     seen, when = view(hop()), instants(hop())
     packed = seen["frames"]["state"]
     state = np.frombuffer(base64.b64decode(packed["data"]), "<f4").reshape(packed["shape"])
-    flags = at_times(hop(), when).history.separated
+    flags = hop().at_times(when).history.separated
     assert flags.any() and not flags.all()
     np.testing.assert_array_equal(state == STATES.index("separated"), flags)
 

@@ -25,7 +25,6 @@ from msfp_gen.results.geometry import (
     slider_face,
     slider_radius,
 )
-from msfp_gen.results.joining import at_times
 from msfp_gen.results.sliding import intervals, rims_in_contact, sliding_surfaces
 
 RUNS = ("fenz-monotonic", "fenz-test5", "becker-circle-125", "unusual-tfp")
@@ -156,7 +155,7 @@ def test_outline_has_the_height_and_the_spheres_of_its_data(layout):
 
 def test_cut_of_a_tilted_face_lies_in_the_plane_and_on_its_sphere():
     run = preset_run("becker-circle-125")
-    seen, bearing = poses(at_times(run, [80.0, 100.0])), run.scene.bearing
+    seen, bearing = poses(run.at_times([80.0, 100.0])), run.scene.bearing
     plane = Plane(seen.top[0, 2], 0.3)
     for surface in range(4):
         body = bearing.slider(surface)
@@ -171,13 +170,13 @@ def test_cut_of_a_tilted_face_lies_in_the_plane_and_on_its_sphere():
 
 def test_a_time_outside_the_run_is_refused():
     with pytest.raises(InputError, match=r"time = 99 s: the run holds 0 to .* s; give a time in between"):
-        at_times(preset_run("fenz-monotonic"), 99.0)
+        preset_run("fenz-monotonic").at_times(99.0)
 
 
 def test_between_rows_angles_run_straight():
     run = preset_run("fenz-test5")
     t = run.history.time[100:102]
-    middle, ends = poses(at_times(run, t.mean())), poses(at_times(run, t))
+    middle, ends = poses(run.at_times(t.mean())), poses(run.at_times(t))
     assert middle.top[0, -1] == pytest.approx(ends.top[:, -1].mean(axis=0), abs=1e-6)
 
 

@@ -24,7 +24,8 @@ from msfp_gen.results.result import AnyResult, Result
 from msfp_gen.results.summary import rows_of_bearing
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file import catalogue
-from msfp_gen.scene.file.loader import NO_PARTS, scene_from_table, scene_text
+from msfp_gen.scene.file.changes import changed_table
+from msfp_gen.scene.file.loader import NO_PARTS, bearing_tables, scene_from_table, scene_text
 from msfp_gen.scene.system import GROUP, Kind, OtherSystem, kinds
 from msfp_gen.simulation.bearing_run import BearingRun, start_bearing
 from msfp_gen.studies import read_study
@@ -274,6 +275,15 @@ def test_a_kind_without_more_runs_and_is_explained(file: Path, monkeypatch: pyte
     bare = load_scene(file)
     assert np.array_equal(simulate(bare).history.top_force, simulate(bare.whole).history.top_force)
     assert main(["explain", str(file)]) == 0
+
+
+def test_a_kind_names_the_table_of_its_bearings(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules[__name__], "PAIR", replace(PAIR, named="devices"))
+    kinds.cache_clear()
+    table = {"pair": {"bearing": "corner"}, "devices": {"corner": {"preset": "fenz-tfp"}, "edge": "fenz-dp"}}
+    changed = changed_table(table, {"pair.bearing.friction": 0.1})
+    assert changed["pair"]["bearing"] == {"preset": "fenz-tfp", "friction": 0.1}
+    assert bearing_tables(table) == {"corner": {"preset": "fenz-tfp"}}
 
 
 def test_what_it_has_not_is_one_line(file: Path) -> None:

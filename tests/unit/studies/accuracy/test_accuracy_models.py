@@ -14,7 +14,8 @@ from support.peers import opensees_runs
 
 from msfp_gen import InputError, Motion, RunError, Top, load_scene, presets, simulate
 from msfp_gen.cli import main
-from msfp_gen.studies.accuracy import methods, model_errors, series
+from msfp_gen.scene.planarity import along
+from msfp_gen.studies.accuracy import model_errors, series
 from msfp_gen.studies.accuracy.methods import METHODS, VARIANTS
 from msfp_gen.studies.accuracy.series import Series, run_series
 from msfp_gen.studies.accuracy.study import _variant_trials, markdown, without_stop
@@ -167,7 +168,7 @@ def test_a_motion_in_two_directions_is_run_axis_by_axis():
     full = run_native("implicit", scene, 1e-3, 20.0)
     assert found.status == OK and found.newton > full.newton and found.rows == ROWS + 1
     assert errors(found, full)["force"].rms > 0.05  # friction does not act axis by axis
-    one = replace(scene, effects=replace(scene.effects, dimension="planar"), motion=methods._along(scene.motion, 0))
+    one = replace(scene, effects=replace(scene.effects, dimension="planar"), motion=along(scene.motion, 0))
     alone = simulate(replace(one, motion_table=None, output_step=12.0 / ROWS, solver=replace(scene.solver, rtol=1e-3)))
     assert found.histories["force"][:, 0, 0] == pytest.approx(alone.history.top_force[: ROWS + 1, 0], abs=1.0)
 
@@ -176,7 +177,7 @@ def test_a_rocking_base_has_no_planar_parts():
     pieces = np.zeros((1, 6, 6))
     pieces[0, :5, 3] = 1e-3
     with pytest.raises(InputError, match="rocks about both axes"):
-        methods._along(Motion(np.array([0.0, 1.0]), pieces), 0)
+        along(Motion(np.array([0.0, 1.0]), pieces), 0)
 
 
 class Ops(ModuleType):
