@@ -21,7 +21,6 @@ from msfp_gen.report.page import BEARING
 from msfp_gen.results.dataset import columns
 from msfp_gen.results.quantities import quantities
 from msfp_gen.results.result import AnyResult, Result
-from msfp_gen.results.summary import rows_of_bearing
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file import catalogue
 from msfp_gen.scene.file.changes import changed_table
@@ -110,11 +109,14 @@ class PairResult(AnyResult):
         own = self.half.summary
         return own | {"peak_force": {axis: 2 * force for axis, force in own["peak_force"].items()}}
 
+    def at_times(self, times: Any) -> Any:
+        return replace(self, half=self.half.at_times(times))
+
     def characterise(self) -> Any:
         return self.half.characterise()
 
     def main_results(self) -> Any:
-        return rows_of_bearing(self.summary)
+        return [("peak force of both", f"{1e-3 * self.summary['peak_force']['radial']:.4g} kN")]
 
     def part_tables(self) -> Any:
         return self.half.part_tables()
