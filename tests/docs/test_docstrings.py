@@ -139,6 +139,7 @@ def public_docstrings(node: ast.Module | ast.ClassDef) -> Iterator[str]:
 
 def test_pages_and_public_docstrings_say_the_noun_again() -> None:
     pages = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/*.md*")]
+    pages += (ROOT / "examples" / "gallery").rglob("*.py")
     texts = [(path, path.read_text("utf-8")) for path in pages if path.name != "CHANGELOG.md"]
     texts += [(path, text) for path in SOURCES for text in public_docstrings(ast.parse(path.read_text("utf-8")))]
     found = [(path.name, hit[0]) for path, text in texts if (hit := NOT_REPEATED.search(" ".join(text.split())))]

@@ -27,7 +27,7 @@ result = simulate(
 # The energy dissipated in every cycle, over the energy of the first cycle.
 
 energy = [cycle.loop.energy_dissipated for cycle in result.characterise().cycles]
-print("loss of the cycles over that of the first:", [round(one / energy[0], 2) for one in energy])
+print("loss of every cycle over the loss of the first:", [round(one / energy[0], 2) for one in energy])
 print(f"largest temperature at the centre of the dish: {result.dataset['temperature'].max():.0f} degC")
 
 # %%

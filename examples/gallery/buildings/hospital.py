@@ -13,15 +13,10 @@ from msfp_gen import BaseSlab, Bearing, Building, BuildingBearing, BuildingScene
 from msfp_gen.motions.records import bundled
 
 isolator = Bearing.from_sheet(
-    device="triple",
-    radius=["2235 mm", "406 mm"],
-    height=["178 mm", "45 mm"],
-    friction=[0.06, 0.02, 0.02, 0.06],
-    slider_diameter=["508 mm", "200 mm"],
-    dish_diameter=["1220 mm", "356 mm"],
-    plate_height="70 mm",
+    device="triple", radius=["2235 mm", "406 mm"], height=["178 mm", "45 mm"], friction=[0.06, 0.02, 0.02, 0.06],
+    slider_diameter=["508 mm", "200 mm"], dish_diameter=["1220 mm", "356 mm"], plate_height="70 mm",
     axial_load="1250 kN",
-)
+)  # fmt: skip
 storey = Storey(
     height="4 m", mass="380 t", inertia=(7.1e6, 16e6, 23.1e6), mass_centre=("1.1 m", "0.75 m"),
     stiffness=("360 kN/mm", "300 kN/mm"), torsional_stiffness=3.5e10, vertical_stiffness="31 MN/mm",

@@ -6,11 +6,10 @@ its light sliders vibrate? The equations of motion of PEER Report 2017/07 answer
 rest, and positions and sizes of the normal forces are eliminated.
 """
 
-from __future__ import annotations
-
 import matplotlib.pyplot as plt
 import numpy as np
 import sympy as sp
+from scipy.linalg import eigvalsh
 
 from msfp_gen import Effects, Layout, Top, presets, symbolic
 
@@ -20,7 +19,6 @@ from msfp_gen import Effects, Layout, Top, presets, symbolic
 
 model = symbolic(Layout.tfp(), Effects(dimension="planar", rims=False))
 bodies = model.spec.layout.surfaces
-normal = model.unknowns[-bodies:]
 rest = dict.fromkeys((*model.state, *model.unknowns[:-bodies], *model.inputs), 0)
 rest |= {s: 0 for s in model.parameters if s.name[:2] in ("T_", "c_", "u_") or s.name == "k_T"}
 print([row for row in model.residual.subs(rest).expanded() if row != 0])
@@ -38,15 +36,12 @@ def at_rest(expressions):
 
 
 J, S = at_rest(model.jacobian("unknowns")), at_rest(model.jacobian("state"))
-forces = [i for i, name in enumerate(model.residual.names) if name.startswith("E")]
-moments = [i for i, name in enumerate(model.residual.names) if name.startswith("t")]
-contacts, given = J[:, bodies:], sp.Matrix.hstack(J[:, :bodies], S)
-left = list(range(given.shape[1]))
-eliminated = contacts.extract(forces, list(range(2 * bodies))).LUsolve(given.extract(forces, left))
-reduced = given.extract(moments, left) - contacts.extract(moments, list(range(2 * bodies))) * eliminated
+forces, moments = ([i for i, name in enumerate(model.residual.names) if name[0] == letter] for letter in "Et")
 relative = sp.Matrix(bodies, bodies, lambda i, j: 1 if i == j else -1 if i == j + 1 else 0)
-M, K, D, F = (reduced[:, i * bodies : (i + 1) * bodies].applyfunc(sp.cancel) for i in range(4))
-M, K = ((matrix * relative).applyfunc(lambda x: sp.factor(sp.expand(x))) for matrix in (M, K))
+contacts = J[:, bodies:]
+given = sp.Matrix.hstack(J[:, :bodies], S) * sp.diag(relative, relative, relative, sp.eye(bodies))
+reduced = given[moments, :] - contacts[moments, :] * contacts[forces, :].LUsolve(given[forces, :])
+M, K, D, F = (reduced[:, i * bodies : (i + 1) * bodies].applyfunc(sp.factor) for i in range(4))
 assert D.is_zero_matrix
 print("stiffness of the lowest slider:", K[0, 0])
 
@@ -56,7 +51,7 @@ print("stiffness of the lowest slider:", K[0, 0])
 # velocity over the yield displacement, and Y = B q. It adds the stiffness F B.
 
 B = at_rest(model.friction_rates.jacobian(model.state))[:, bodies : 2 * bodies] * relative
-stuck = (F * B).applyfunc(lambda x: sp.factor(sp.expand(x)))
+stuck = (F * B).applyfunc(sp.factor)
 print("friction at the lowest slider:", stuck[0, 0])
 
 # %%
@@ -64,23 +59,11 @@ print("friction at the lowest slider:", stuck[0, 0])
 
 bearing = presets.bearing("fenz-tfp")
 top = Top.mass(112e3 / bearing.gravity, inertia=1e4, height=0.5, rotational_stiffness=1e8)
-numbers = dict(zip(model.parameters, model.values(bearing, top), strict=True))
-masses = np.array([body.mass for body in bearing.bodies])
-masses[-1] += top.mass
-numbers |= dict(zip(normal, bearing.gravity * np.cumsum(masses[::-1])[::-1], strict=True))
+above = np.cumsum([top.mass, *(body.mass for body in reversed(bearing.bodies))])[:0:-1]  # mass on each surface
+symbols = (*model.parameters, *model.unknowns[-bodies:])
+numbers = dict(zip(symbols, (*model.values(bearing, top), *(bearing.gravity * above)), strict=True))
 mass, hanging, friction = (np.array(matrix.subs(numbers), dtype=float) for matrix in (M, K, stuck))
-
-
-def frequencies(stiffness):
-    """Natural frequencies [Hz], the lowest first, and the modes as columns."""
-    squares, modes = np.linalg.eig(np.linalg.solve(mass, stiffness))
-    order = np.argsort(squares.real)
-    assert squares.real.min() > 0
-    return np.sqrt(squares.real[order]) / (2 * np.pi), modes.real[:, order]
-
-
-found, modes = frequencies(hanging + friction)
-free, _ = frequencies(hanging)
+found, free = (np.sqrt(eigvalsh(stiffness, mass)) / (2 * np.pi) for stiffness in (hanging + friction, hanging))
 print("stuck [Hz]:", found.round(2))
 print("without friction [Hz]:", free.round(3))
 
