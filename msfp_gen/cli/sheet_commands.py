@@ -189,8 +189,7 @@ def _means(folder: Path, leave_out: Sequence[str], cases: Sequence[str]) -> tupl
     """The peaks of a suite at bounds: means over its records at each bound. Raises InputError for other bounds."""
     from msfp_gen.studies.bounding import SHEET, suite_peaks
 
-    with prefixed("--history = "):
-        bounds, means = suite_peaks(folder, leave_out)
+    bounds, means = suite_peaks(folder, leave_out)
     if len(cases) > 1 and bounds.factors != SHEET.name:
         raise InputError(
             f"--history = {str(folder)!r}: its bounds are by {bounds.factors}, not by the sheet; give the folder of "
