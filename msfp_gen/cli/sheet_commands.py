@@ -171,7 +171,9 @@ def _on_bearings(file: Path, bearing: Bearing) -> tuple[str, float | None]:
 
 def _peaks(path: Path, leave_out: Sequence[str], cases: Sequence[str]) -> tuple[dict[str, tuple[float, float]], str]:
     """Case -> largest displacement of a bearing [m] and base shear over weight, of a run or suite; and their words."""
-    if path.is_dir():
+    from msfp_gen.report.analysis import is_suite_folder
+
+    if is_suite_folder(path):
         return _means(path, leave_out, cases)
     result: Any = load_source(str(path))
     if not is_result(result):

@@ -275,7 +275,7 @@ def test_a_run_is_compared_at_every_bound(tmp_path: Path, capsys: pytest.Capture
     ("options", "words"),
     [
         (["--history", "single-push"], "--history = 'single-push': give a saved result"),
-        (["--history", "{folder}"], "study.toml"),
+        (["--history", "{folder}"], "give the folder of `msfp-gen bound --suite"),
         (["--leave-out", "CLC"], "--leave-out: "),
     ],
 )
