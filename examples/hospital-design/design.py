@@ -128,8 +128,10 @@ def main() -> None:
     else:
         suite.write_text((HERE / "suite.toml").read_text(encoding="utf-8"), encoding="utf-8")
     command("sheet", scene, "--displacement", f"{DISPLACEMENT} m", "-o", folder / "sheet.png")
-    command("equivalent", scene, "--spectrum", HERE / "spectrum.csv", "--torsion", TORSION)
+    equivalent = ("equivalent", scene, "--spectrum", HERE / "spectrum.csv", "--torsion", TORSION)
+    command(*equivalent)
     command("bound", scene, "--suite", suite, "-o", folder / "analysis")
+    command(*equivalent, "--history", folder / "analysis")
     command("report", folder / "analysis", "-o", folder / "report.html", "--project", "Hospital on twenty pendulums",
             "--code", "example, no code", "--author", "an engineer", "--checker", "another engineer")  # fmt: skip
 

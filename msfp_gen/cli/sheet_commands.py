@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from msfp_gen.cli.console import answer, is_result, load_source, note
-from msfp_gen.common.errors import InputError
+from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from msfp_gen.scene.bearing import Bearing
 
 app = typer.Typer()
 
@@ -67,7 +72,8 @@ def sheet(
 @app.command(
     epilog="Examples:\n\n\b\n  msfp-gen equivalent scene.toml --spectrum design.csv --damping asce7\n"
     "  msfp-gen equivalent scene.toml --spectrum design.csv --damping 0.05:1,0.1:1.2,0.2:1.5,0.3:1.7\n"
-    '  msfp-gen equivalent scene.toml --spectrum design.csv --torsion "7.3 m,0.73 m,14.6 m,14.6 m" --history run.nc'
+    '  msfp-gen equivalent scene.toml --spectrum design.csv --torsion "7.3 m,0.73 m,14.6 m,14.6 m"\n'
+    "  msfp-gen equivalent scene.toml --spectrum design.csv --history bounds   # of `bound --suite -o bounds`"
 )
 def equivalent(
     file: SheetFile,
@@ -84,14 +90,22 @@ def equivalent(
         ),
     ] = None,
     history: Annotated[
-        Path | None, typer.Option(metavar="RESULT.nc", help="A run, whose peaks are compared with the procedure.")
+        Path | None,
+        typer.Option(
+            metavar="RESULT.nc|DIR",
+            help="A run, or the folder of `bound --suite -o DIR`, whose peaks are compared with the procedure.",
+        ),
+    ] = None,
+    leave_out: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RECORD", help="A record of the suite of --history that is in no mean; may be repeated."),
     ] = None,
     bearing: OfBuilding = None,
     as_json: AsJson = False,
 ) -> None:
     """Equivalent lateral procedure: displacement and base shear from a spectrum, at each bound of friction."""
     from msfp_gen.design import equivalent as procedure
-    from msfp_gen.design.sheet import SheetReport
+    from msfp_gen.design.sheet import CASES, SheetReport
     from msfp_gen.motions.records.scaling import read_spectrum
     from msfp_gen.scene.file.loader import load_sheet
 
@@ -100,13 +114,23 @@ def equivalent(
     report = SheetReport(*load_sheet(file, bearing))
     gravity = report.bearing.gravity
     found = {case: procedure.equivalent(b, pairs, factor, gravity) for case, b in report.backbones.items()}
-    peaks = None if history is None else _peaks(history)
-    load = report.sheet.axial_load
-    answer(
-        procedure.as_dict(found, load, arms, peaks),
-        procedure.tables(report.name, found, load, rule, arms, peaks),
-        as_json,
+    if leave_out and not (history and history.is_dir()):
+        raise InputError("--leave-out: it is for the records of a suite; give its folder to --history")
+    peaks, words = ({}, "") if history is None else _peaks(history, leave_out or (), list(found))
+    bearings, weight = _on_bearings(file, report.bearing)
+    given = procedure.Given(
+        load=report.sheet.axial_load,
+        gravity=gravity,
+        friction={case: getattr(report.sheet, name) for case, name in CASES.items()},
+        spectrum=f"{spectrum.name}, {len(pairs)} rows from {pairs[0][0]:g} to {pairs[-1][0]:g} s, linear in logarithms",
+        damping=rule,
+        bearings=bearings,
+        weight=weight,
+        arms=arms,
+        peaks=peaks,
+        history=words,
     )
+    answer(procedure.as_dict(found, given), procedure.tables(report.name, found, given), as_json)
 
 
 def _lengths(text: str) -> tuple[float, ...]:
@@ -124,18 +148,57 @@ def _lengths(text: str) -> tuple[float, ...]:
     return tuple(values)
 
 
-def _peaks(path: Path) -> tuple[float, float]:
-    """Largest mean displacement of the bearings of a run [m], and largest sum of their forces over the load at rest."""
-    # Raises InputError for a file that is no result, or loads that change.
-    import numpy as np
+def _on_bearings(file: Path, bearing: Bearing) -> tuple[str, float | None]:
+    """The bearings of a building in words, and their load at rest if all are this one [N]; "", None without one."""
+    from msfp_gen.scene.file.loader import toml_file
+    from msfp_gen.scene.file.source import kind_of, scene_of
 
+    with prefixed(f"{file}: "):
+        table = toml_file(file)
+        kind = kind_of(table)
+        if kind is None:
+            return "", None
+        # Loads at rest need no ground motion, and a project may have no records yet.
+        unused = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}
+        building = {key: table[key] for key in (kind.key, "bearings") if key in table}
+        scene = scene_of({**building, "motion": unused}, file.parent)
+    weight, count = sum(scene.loads_at_rest), len(scene.every_bearing)
+    equal = sum(each == bearing for each in scene.every_bearing)
+    if equal < count:
+        return f"{equal} of {count} are of this sheet, so that no base shear of the building follows", None
+    return f"{count}, all of this sheet; weight on them {weight / 1e6:.4g} MN", weight
+
+
+def _peaks(path: Path, leave_out: Sequence[str], cases: Sequence[str]) -> tuple[dict[str, tuple[float, float]], str]:
+    """Case -> largest displacement of a bearing [m] and base shear over weight, of a run or suite; and their words."""
+    from msfp_gen.report.analysis import is_suite_folder
+
+    if is_suite_folder(path):
+        return _means(path, leave_out, cases)
     result: Any = load_source(str(path))
     if not is_result(result):
-        raise InputError(f"--history = {str(path)!r}: give a saved result (.nc)")
-    bearings = result.bearings
-    loads: list[Any] = [bearing.axial_load for bearing in bearings]
-    if None in loads:
+        raise InputError(f"--history = {str(path)!r}: give a saved result (.nc), or the folder of `bound --suite`")
+    if not result.succeeded:
+        raise InputError(f"--history = {str(path)!r}: its run failed ({result.status}); give one that reached its end")
+    shear = result.entry("peak_force_ratio")
+    if shear is None:
         raise InputError(f"--history = {str(path)!r}: its axial load changes; give a run with a load at rest")
-    u = np.mean([bearing.history.displacement for bearing in bearings], axis=0)
-    force = np.sum([bearing.history.top_force for bearing in bearings], axis=0)
-    return float(np.hypot(*u[:, :2].T).max()), float(np.hypot(*force[:, :2].T).max() / sum(loads))
+    peaks = (result.entry("peak_displacement")["radial"], shear)
+    return dict.fromkeys(cases, peaks), f"{path.name}, one run, compared at every friction"
+
+
+def _means(folder: Path, leave_out: Sequence[str], cases: Sequence[str]) -> tuple[dict[str, tuple[float, float]], str]:
+    """The peaks of a suite at bounds: means over its records at each bound. Raises InputError for other bounds."""
+    from msfp_gen.studies.bounding import SHEET, suite_peaks
+
+    bounds, means = suite_peaks(folder, leave_out)
+    if len(cases) > 1 and bounds.factors != SHEET.name:
+        raise InputError(
+            f"--history = {str(folder)!r}: its bounds are by {bounds.factors}, not by the sheet; give the folder of "
+            "`bound --suite` without --factors"
+        )
+    count = len(bounds.records)
+    parts = [f"{folder.name}: mean of {count} record{'s' * (count > 1)} at each bound"]
+    parts += [f"{case} {text}" for case, text in bounds.incomplete.items() if case in cases]
+    parts += [f"left out: {', '.join(bounds.left_out)}"] if bounds.left_out else []
+    return means, "; ".join(parts)

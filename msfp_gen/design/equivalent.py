@@ -7,7 +7,7 @@ the effective properties give it again goes out.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import pi, sqrt
 from typing import Any
 
@@ -152,31 +152,64 @@ def total_displacement(
 
 
 Arms = Sequence[float]  # y, e, b, d [m] and P_T of `total_displacement`
-Peaks = tuple[float, float]  # of a response history: displacement [m], base shear over weight [-]
+Peaks = tuple[float, float]  # of response histories: largest displacement of a bearing [m], base shear over weight [-]
 
 
-def as_dict(
-    found: Mapping[str, Equivalent], load: float, arms: Arms | None = None, peaks: Peaks | None = None
-) -> dict[str, Any]:
-    """Case of friction -> results in SI units, ready for JSON. load: on the bearing [N]."""
+@dataclass(frozen=True)
+class Given:
+    """What the procedure is given, beside its backbones: for `as_dict` and `tables`.
+
+    Attributes:
+        load: axial load of the sheet [N].
+        gravity: [m/s^2].
+        friction: case of friction -> coefficients at the pivot, bottom first [-].
+        spectrum: of 5 % damping, in words.
+        damping: rule of the factor B, in words.
+        bearings: of the building, in words; "" without one.
+        weight: of the building on bearings that all have the backbone [N]; None without one.
+        arms: of `total_displacement`; None: no total displacement.
+        peaks: case of friction -> peaks of the response histories that are compared with it.
+        history: whose peaks these are, in words.
+    """
+
+    load: float
+    gravity: float
+    friction: Mapping[str, Sequence[float]]
+    spectrum: str
+    damping: str
+    bearings: str = ""
+    weight: float | None = None
+    arms: Arms | None = None
+    peaks: Mapping[str, Peaks] = field(default_factory=dict)
+    history: str = ""
+
+
+def as_dict(found: Mapping[str, Equivalent], given: Given) -> dict[str, Any]:
+    """Case of friction -> results in SI units, ready for JSON."""
     rows = {}
     for case, result in found.items():
         at = result.at
-        rows[case] = {
+        row = rows[case] = {
             "displacement": at.displacement,
             "effective_period": at.period,
             "effective_damping": at.damping,
-            "effective_stiffness": at.stiffness * load,
+            "effective_stiffness": at.stiffness * given.load,
             "spectral_acceleration": result.acceleration,
             "damping_factor": result.factor,
-            "base_shear": at.force * load,
+            "base_shear": at.force * given.load,
             "base_shear_over_weight": at.force,
         }
-        if arms is not None:
-            rows[case]["total_displacement"] = total_displacement(at.displacement, *arms)
-        if peaks is not None:
-            rows[case]["history_displacement_ratio"] = peaks[0] / at.displacement
-            rows[case]["history_base_shear_ratio"] = peaks[1] / at.force
+        if given.weight is not None:
+            row["building_base_shear"] = at.force * given.weight
+        if given.arms is not None:
+            row["total_displacement"] = total_displacement(at.displacement, *given.arms)
+        if case in given.peaks:
+            displacement, shear = given.peaks[case]
+            row["history_displacement"], row["history_base_shear_over_weight"] = displacement, shear
+            row["history_displacement_ratio"] = displacement / at.displacement
+            row["history_base_shear_ratio"] = shear / at.force
+            if given.arms is not None:
+                row["history_total_displacement_ratio"] = displacement / row["total_displacement"]
     return rows
 
 
@@ -191,40 +224,47 @@ ROWS = {
     "damping_factor": ("damping factor B", 1.0, ".3f"),
     "base_shear": ("base shear of the bearing [kN]", 1e-3, ".4g"),
     "base_shear_over_weight": ("base shear over weight", 1.0, ".4f"),
-    "history_displacement_ratio": ("response history over D", 1.0, ".3f"),
-    "history_base_shear_ratio": ("response history over base shear", 1.0, ".3f"),
+    "building_base_shear": ("base shear of the building [MN]", 1e-6, ".4g"),
+    "history_displacement": ("history: displacement of a bearing [mm]", 1e3, ".1f"),
+    "history_displacement_ratio": ("history: this over D", 1.0, ".3f"),
+    "history_total_displacement_ratio": ("history: this over D_T", 1.0, ".3f"),
+    "history_base_shear_over_weight": ("history: base shear over weight", 1.0, ".4f"),
+    "history_base_shear_ratio": ("history: this over V/W", 1.0, ".3f"),
 }
 
 
-def tables(
-    name: str,
-    found: Mapping[str, Equivalent],
-    load: float,
-    rule: str,
-    arms: Arms | None = None,
-    peaks: Peaks | None = None,
-) -> list[Table]:
+def tables(name: str, found: Mapping[str, Equivalent], given: Given) -> list[Table]:
     """Results by case, and the formulas with their inputs."""
-    cases = as_dict(found, load, arms, peaks)
-    known = [key for key in ROWS if key in next(iter(cases.values()))]
+    cases = as_dict(found, given)
     rows = [
-        (ROWS[key][0], *(format(values[key] * ROWS[key][1], ROWS[key][2]) for values in cases.values()))
-        for key in known
+        (label, *(format(values[key] * scale, digits) if key in values else "-" for values in cases.values()))
+        for key, (label, scale, digits) in ROWS.items()
+        if any(key in values for values in cases.values())
     ]
     formulas = [
         ("displacement", "D = S_a(T_eff) (T_eff/2 pi)^2/B, by iteration; the largest solution"),
         ("effective", "k_eff = F(D)/D, T_eff = 2 pi sqrt(W/(g k_eff)), beta = loop area/(2 pi k_eff D^2)"),
-        ("base shear", "V = k_eff D"),
-        ("damping factor", rule),
-        ("axial load", f"{load / 1e3:.4g} kN"),
+        (
+            "base shear",
+            "V = k_eff D" + (", of the building (V/W) times its weight" if given.weight is not None else ""),
+        ),
+        ("damping factor", given.damping),
+        ("spectrum of 5 % damping", given.spectrum),
+        ("gravity g", f"{given.gravity:.6g} m/s2"),
+        *(
+            (f"friction at the pivot, {case}", ", ".join(f"{value:.4g}" for value in given.friction[case]))
+            for case in found
+        ),
+        ("axial load W", f"{given.load / 1e3:.4g} kN"),
     ]
-    if arms is not None:
-        y, e, b, d, *ratio = arms
+    if given.bearings:
+        formulas.append(("bearings of the building", given.bearings))
+    if given.arms is not None:
+        y, e, b, d, *ratio = given.arms
         words = f"y = {y:g} m, e = {e:g} m, b = {b:g} m, d = {d:g} m, P_T = {ratio[0] if ratio else 1.0:g}"
         formulas.append(("total displacement", f"D_T = D (1 + y/P_T^2 12 e/(b^2 + d^2)), {words}"))
-    if peaks is not None:
-        words = f"{peaks[0] * 1e3:.4g} mm, base shear over weight {peaks[1]:.4f}"
-        formulas.append(("response history", words))
+    if given.history:
+        formulas.append(("response history", given.history))
     return [
         Table(f"{name}: equivalent lateral procedure", ("friction", *cases), rows),
         Table("formulas and inputs", (), formulas),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from math import asin, cos, sin
+from math import asin, cos, sin, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -172,6 +173,7 @@ def _rim_points(bearing: Bearing, axis: Array, bottom: Array, top: Array, direct
 POINTS = 60  # number of points of a face
 RIM_HEIGHT = 0.15  # over the thickness of the slider at its edge
 RIM_THICKNESS = 0.06  # over the radius of the rim
+RIM_GAP = 1 / 3  # largest height of a rim over the gap to the dish that it faces: a third stays open between two
 
 
 def outline(bearing: Bearing, body: int) -> Array:
@@ -231,13 +233,25 @@ def _face_and_edge(bearing: Bearing, surface: int, body: int) -> Array:
 
 
 def _rim_height(bearing: Bearing, surface: int) -> float:
-    """Height of the rim of a surface [m]: a share of the thickness of its slider at the edge."""
+    """Height of the rim of a surface [m]: a share of the thickness of its slider at the edge, at most of its gaps."""
     body = bearing.slider(surface)
     thickness = float(bearing.arrays()["height"][body])
     for other in (body - 1, body):
         if 0 <= other < bearing.layout.surfaces:
             thickness -= float(_face(bearing, other, body)[-1, 1])
-    return RIM_HEIGHT * max(thickness, 0.0)
+    return max(0.0, min([RIM_HEIGHT * thickness, *(RIM_GAP * gap for gap in _gaps(bearing, surface))]))
+
+
+def _gaps(bearing: Bearing, surface: int) -> Iterator[float]:
+    """Distance at rest of the edge of a dish from every dish that faces it there [m]."""
+    edge, signs = dish_radius(bearing, surface), bearing.layout.signs
+    levels = np.cumsum(bearing.arrays()["height"])  # of the surfaces, on the axis
+    for other, sign in enumerate(signs):
+        facing = dish_radius(bearing, other)
+        if sign != signs[surface] and facing * (1 + RIM_THICKNESS) >= edge:
+            radii = bearing.surfaces[surface].radius, bearing.surfaces[other].radius
+            deep = sum(radius - sqrt(radius**2 - min(edge, facing) ** 2) for radius in radii)
+            yield abs(float(levels[other] - levels[surface])) - deep
 
 
 def _flat_face(face: Array, other: Array) -> Array:

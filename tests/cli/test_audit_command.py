@@ -45,7 +45,7 @@ def test_what_is_inconsistent_is_printed_and_drawn(files, capsys):
     printed = " ".join(capsys.readouterr().out.split())
     assert "inconsistent: weight; " in printed and "half of the bearings" in printed
     page = (files / "audit.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png") >= 5 and "half of the bearings" in page
+    assert page.count("data:image/webp") >= 5 and "half of the bearings" in page
     assert main([*arguments, "--json"]) == 1
     found = {one["check"]: one for one in json.loads(capsys.readouterr().out)["findings"]}
     assert found["weight"]["verdict"] == "inconsistent" and found["weight"]["value"] == pytest.approx(0.5, rel=0.01)
@@ -101,7 +101,7 @@ def test_a_shadow_is_printed_and_written(files, capsys):
     assert found["difference"] < 0.01 and found["missing"] == []
     assert found["model"]["status"] == "ok" and (files / "model.nc").exists()
     page = (files / "shadow.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png") == 2 + len(found["differences"]) - 1  # a loop along E1, and every difference
+    assert page.count("data:image/webp") == 2 + len(found["differences"]) - 1  # a loop along E1, and every difference
     assert f"+- {100 * found['error']:.1g} %" in page and "differs by less tells nothing" in page
     for effect in found["left_out"]:
         assert effect in page

@@ -41,7 +41,7 @@ DRAWN = ("peak_displacement", "peak_force", "peak_floor_acceleration", "peak_dri
 IN_ROW, MOST_BELOW = 3, 14  # panels of the figure in a row; entries of the legend below each other
 WORST: dict[str, Callable[..., Any]] = {"most": np.nanmax, "least": np.nanmin}
 # Kept beside the quantities that have a governing value.
-OF_RUN = ("duration", "verdict", "verdict_text", "limits_reached", "closure_error", "steps")
+OF_RUN = ("duration", "verdict", "verdict_text", "limits_reached", "closure_error", "steps", "peak_force_ratio")
 NO_VALUE = "some runs that reached their end have no such value"
 
 
@@ -254,6 +254,27 @@ def load_suite_bounds(folder: str | Path, leave_out: Collection[str] = ()) -> tu
                 "record to --leave-out"
             )
     return study, _from_rows(study, folder, leave_out)
+
+
+def suite_peaks(
+    folder: str | Path, leave_out: Collection[str] = ()
+) -> tuple[SuiteBounds, dict[str, tuple[float, float]]]:
+    """The result in the folder of `bound_suite`, and its mean peaks by case, over the runs that reached their end.
+
+    The peaks are the largest displacement of a bearing [m], and the base shear over the weight [-], of a single bearing
+    over its axial load. A case without a run that ended is left out. Raises InputError as `load_suite_bounds`, and
+    where a run has no constant axial load.
+    """
+    from msfp_gen.studies.assessment.rows import read_study
+
+    columns = ["peak_displacement", "peak_force_ratio"]
+    bounds = load_suite_bounds(folder, leave_out)[1]
+    rows = read_study(folder, ["record", "bounds", *columns])
+    rows = rows[(rows["status"] == "ok") & ~rows["record"].isin(list(leave_out))]
+    if rows["peak_force_ratio"].isna().any():
+        raise InputError(f"{str(folder)!r}: its axial load changes; give runs with a load at rest")
+    means = rows.groupby("bounds")[columns].mean()
+    return bounds, {case: (float(u), float(shear)) for case, u, shear in means.itertuples()}
 
 
 def check_left_out(leave_out: Collection[str], study: Study) -> None:

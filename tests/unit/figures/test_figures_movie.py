@@ -12,7 +12,7 @@ from support.films import drawn_twice
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.figures import animate, movie
-from msfp_gen.figures.style import page
+from msfp_gen.figures.style import COLOURS, FAINT, INK, page
 
 SHORT = {"seconds": 0.5, "frames_per_second": 6}
 
@@ -32,6 +32,24 @@ def test_gif_has_its_frames_and_they_move(tmp_path):
     assert all(np.abs(one - other).max() > 100 for one, other in pairwise(frames))
     assert told == [(1, 3), (2, 3), (3, 3)]
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_gif_keeps_the_colours_of_the_figures(tmp_path):
+    """The palette is the first frame's: in no frame a colour of the figures is off by more than 2 of 255."""
+    from matplotlib.colors import to_rgb
+    from PIL import Image
+
+    shown = movie.stack_film(preset_run("fenz-test5"), np.linspace(40, 100, 3), None)
+    with page(10.0, shown.height) as figure:
+        drawn = [picture[..., :3].astype(int) for picture in movie.pictures(figure, shown, None)]
+    movie._write_gif((picture.astype(np.uint8) for picture in drawn), tmp_path / "m.gif", 6)
+    with Image.open(tmp_path / "m.gif") as images:
+        for index, picture in enumerate(drawn):
+            images.seek(index)
+            off = np.abs(np.asarray(images.convert("RGB"), dtype=int) - picture).max(axis=-1)
+            for colour in (*COLOURS[:4], INK, FAINT):  # four surfaces
+                there = (picture == np.round(255 * np.array(to_rgb(colour)))).all(axis=-1)
+                assert there.sum() > 50 and off[there].max() <= 2, (index, colour)
 
 
 def test_a_frame_is_what_a_complete_drawing_shows():

@@ -40,7 +40,7 @@ def test_the_page_needs_no_other_file():
     assert not re.search(r"""(src|href)=["']?(https?:|//|file:)""", text) and "block B" in text
     assert "frame &lt;b&gt;" in text and "triple friction pendulum" in text
     assert "peaks of bearings" in text and "isolation system" in text and "4 bearings" in text
-    assert text.count("data:image/png") == 4
+    assert text.count("data:image/webp") == 4
 
 
 def test_the_view_holds_the_motion_of_the_frame():
@@ -116,7 +116,7 @@ def test_a_result_of_one_row_is_drawn(name, tmp_path: Path):
 
 def test_a_result_of_one_row_has_a_page():
     text = report_html(first_row())
-    assert "interrupted" in text and text.count("data:image/png") == 4
+    assert "interrupted" in text and text.count("data:image/webp") == 4
 
 
 @pytest.mark.parametrize("name", OUTSIDE)

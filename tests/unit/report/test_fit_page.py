@@ -56,7 +56,7 @@ def test_numbers_and_limits_stand_on_the_page(tmp_path: Path) -> None:
     assert row and float(row[1]) == pytest.approx(found.tests[0].deviation, rel=1e-3)
     assert abs(float(row[4])) < 0.3, "noise is not correlated"
     assert re.search(r"b &lt;i&gt;\.csv [\d.]+ [\d.]+ 200 50 [\d.]+ 200 1 ", text)
-    assert html.count("data:image/png;base64,") == 2
+    assert html.count("data:image/webp;base64,") == 2
     assert not re.search(r"(src|href)=\"(?!data:|#)", html) and "default-src 'none'" in html
 
 

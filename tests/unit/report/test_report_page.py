@@ -7,23 +7,38 @@ import dataclasses
 import json
 import re
 from html.parser import HTMLParser
+from io import BytesIO
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from support import preset_run
+from support import ROOT, preset_run
 from support.synthetic import loops, opened
 
 from msfp_gen.cli import main
 from msfp_gen.common.errors import InputError, RunError
+from msfp_gen.design.sheet import SheetReport
+from msfp_gen.figures import plot_sheet
+from msfp_gen.figures.style import COLOURS
 from msfp_gen.motions.motion import Motion
 from msfp_gen.report import TitleBlock, report_html, write_report
-from msfp_gen.report.frames import instants, main_direction, packed, pieces, selected_rows, states, view
+from msfp_gen.report.frames import (
+    RESOLUTION,
+    instants,
+    main_direction,
+    packed,
+    picture,
+    pieces,
+    selected_rows,
+    states,
+    view,
+)
 from msfp_gen.report.page import BEARING, TERMS, provenance_table
 from msfp_gen.results.geometry import poses
 from msfp_gen.results.note import Note
 from msfp_gen.results.result import load_result
 from msfp_gen.scene.explain import explain
+from msfp_gen.scene.file.loader import load_sheet
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -217,11 +232,28 @@ def test_data_cannot_end_its_script():
     assert json.loads(Parts(text).data)["states"][1] == "slides"
 
 
+def test_a_picture_has_every_colour_of_its_figure_in_half_the_bytes():
+    """The sheet of the hospital: each pixel as drawn, so that the surfaces keep the palette of all figures."""
+    from matplotlib.colors import to_rgb
+    from PIL import Image
+
+    report, drawn = SheetReport(*load_sheet(ROOT / "examples/hospital-design/hospital.toml")), BytesIO()
+    plot_sheet(report).savefig(drawn, format="png", dpi=RESOLUTION)
+    shown = base64.b64decode(picture("sheet", plot_sheet(report))["webp"])
+    with Image.open(drawn) as wanted, Image.open(BytesIO(shown)) as found:
+        pixels, smaller = np.asarray(found.convert("RGB")), BytesIO()
+        assert np.array_equal(pixels, np.asarray(wanted.convert("RGB")))
+        wanted.convert("RGB").save(smaller, "png", optimize=True)
+    assert len(shown) < 0.6 * len(smaller.getvalue())
+    for colour in COLOURS[:4]:  # of the four surfaces
+        assert (pixels == np.round(255 * np.array(to_rgb(colour)))).all(axis=-1).sum() > 50, colour
+
+
 @pytest.mark.slow
 def test_size_of_a_long_record_with_all_figures_is_bounded(monkeypatch):
     monkeypatch.setattr("msfp_gen.report.page.BEARING", BEARING)
     text = report_html(preset_run("ridgecrest-clc"))
-    assert text.count("data:image/png") == len(BEARING.figures) == 5 and len(text.encode()) < 10e6
+    assert text.count("data:image/webp") == len(BEARING.figures) == 5 and len(text.encode()) < 10e6
 
 
 def test_a_bearing_that_rests_and_a_run_that_failed_have_a_report():

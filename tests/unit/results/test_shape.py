@@ -10,7 +10,7 @@ import pytest
 from reference.cases import LAYOUTS, random_case
 from reference.kinematics import points as reference_points
 from reference.kinematics import rotation
-from support import bearing_of, preset_run
+from support import ROOT, bearing_of, preset_run
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.geometry import (
@@ -26,6 +26,7 @@ from msfp_gen.results.geometry import (
     slider_radius,
 )
 from msfp_gen.results.sliding import intervals, rims_in_contact, sliding_surfaces
+from msfp_gen.scene.file.loader import load_sheet
 
 RUNS = ("fenz-monotonic", "fenz-test5", "becker-circle-125", "unusual-tfp")
 
@@ -151,6 +152,21 @@ def test_outline_has_the_height_and_the_spheres_of_its_data(layout):
         assert np.linalg.norm(near, axis=-1).min(axis=0) == pytest.approx(np.zeros(len(face)), abs=1e-12)
         middle = (0 if sign > 0 else bearing.arrays()["height"][bearing.slider(surface)]) + sign * radius
         assert np.hypot(face[:, 0], face[:, 1] - middle) == pytest.approx(np.full(len(face), radius), rel=1e-9)
+
+
+def test_rims_of_facing_dishes_stay_apart():
+    """Inner dishes of the hospital: R = 406 mm, 356 mm wide, 90 mm apart, so 90 - 2 (406 - sqrt(406^2 - 178^2))."""
+    _, _, bearing = load_sheet(ROOT / "examples" / "hospital-design" / "hospital.toml")
+    gap = 0.090 - 2 * (0.406 - np.sqrt(0.406**2 - 0.178**2))
+    assert gap == pytest.approx(0.0078, abs=1e-5)
+    bottoms = np.concatenate([[0.0], np.cumsum(bearing.arrays()["height"])])
+    below, above = (outline(bearing, body)[:, 1] + bottoms[body] for body in (1, 3))
+    edge = bottoms[2] + 0.045  # middle of the inner slider
+    assert below.max() == pytest.approx(edge - gap / 6) and above.min() == pytest.approx(edge + gap / 6)
+    outer = [outline(bearing, body)[:, 1] + bottoms[body] for body in (0, 4)]
+    assert outer[1].min() - outer[0].max() > 0.1  # room enough: 0.15 of 160 mm each, as without the other dish
+    high = outer[0].max() - bottoms[1] - (2.235 - np.sqrt(2.235**2 - 0.61**2))
+    assert high == pytest.approx(0.15 * (0.133 - (2.235 - np.sqrt(2.235**2 - 0.254**2)) + 0.0411), rel=1e-3)
 
 
 def test_cut_of_a_tilted_face_lies_in_the_plane_and_on_its_sphere():
