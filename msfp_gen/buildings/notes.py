@@ -18,9 +18,11 @@ from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.plausibility import (
     LEAST_DAMPING,
     OF_BEARING,
+    OF_MOTION,
     OF_RUN,
     USUAL_DAMPING,
     Check,
+    Doubt,
     Reading,
     Subject,
     doubtful_values,
@@ -47,20 +49,29 @@ def notes_of(
     monitored: notes of the monitors of the bearings. error: largest error of the energy balance [-]. time: of this
     error [s]. shear: largest base shear [N], and its time [s].
     """
+    notes = [*doubt_notes(scene), *_labelled(scene, _gathered(monitored))]
+    notes += [Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity])] if scene.fidelity in UNSEEN else []
+    doubts = shear_doubts(shear[0], scene.weight, "base shear", "weight of the building")
+    notes += [Note(shear[1], "value", *doubt) for doubt in doubts]
+    if error > ENERGY_LIMIT:
+        notes.append(Note(time, "energy", 0, error, ENERGY.format(value=error)))
+    return tuple(sorted(notes, key=lambda note: note.time))
+
+
+def doubt_notes(scene: BuildingScene) -> list[Note]:
+    """The notes on doubtful values of the bearings, each with a label, and of the building."""
     values = [
         replace(note, bearing=number)
         for number, (mount, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True), start=1)
         for note in value_notes(mount, load)
     ]
-    notes = [*shared(values), *_gathered(monitored)]
-    labelled = [replace(note, text=f"{scene.label(note.bearing - 1)}: {note.text}") for note in notes]
     whole = [Note(0.0, "value", *doubt) for doubt in building_doubts(scene)]
-    whole += [Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity])] if scene.fidelity in UNSEEN else []
-    doubts = shear_doubts(shear[0], scene.weight, "base shear", "weight of the building")
-    whole += [Note(shear[1], "value", *doubt) for doubt in doubts]
-    if error > ENERGY_LIMIT:
-        whole.append(Note(time, "energy", 0, error, ENERGY.format(value=error)))
-    return tuple(sorted([*labelled, *whole], key=lambda note: note.time))
+    return [*_labelled(scene, shared(values)), *whole]
+
+
+def _labelled(scene: BuildingScene, notes: Iterable[Note]) -> list[Note]:
+    """The notes with the labels of their bearings."""
+    return [replace(note, text=f"{scene.label(note.bearing - 1)}: {note.text}") for note in notes]
 
 
 def shared(notes: Iterable[Note]) -> list[Note]:
@@ -90,25 +101,26 @@ def _gathered(notes: Sequence[Note]) -> list[Note]:
     return gathered
 
 
+def _has_rims(mount: BuildingBearing) -> bool:
+    """Whether a run of the bearing may model its rims."""
+    return (mount.effects or Auto()).rims is not False
+
+
 def value_notes(mount: BuildingBearing, load: float) -> tuple[Note, ...]:
     """Notes about doubtful values of a bearing and its interface. load: at rest [N]."""
     stiffness, needed, _ = standing_below(mount, load)
     doubts = (
-        *doubtful_values(mount.bearing, load),
+        *doubtful_values(mount.bearing, load, _has_rims(mount)),
         *unread_values(mount.bearing, mount.effects or Auto()),
         *unsteady("interface.rotational_stiffness", stiffness, needed),
     )
     return tuple(Note(0.0, "value", *doubt) for doubt in doubts)
 
 
-LIGHT = 0.005  # mass of a floor over the mean of all floors, below which it is doubtful
-GYRATION = 1.0  # radius of gyration of a floor over the largest distance of two bearings, above which it is doubtful
 SHARE = 0.1  # lateral acceleration over gravity at which drifts are compared
-DRIFT = 0.05  # drift over the height of the storey above which the stiffness is doubtful
-HEIGHT = 20.0  # height of a storey above which it is doubtful [m]
+HEIGHT = 20.0  # height of a storey above which it is doubtful, and its drift is not judged [m]
+LIGHT = 0.005  # mass of a floor over the mean of all floors, below which it is doubtful, and its inertia is not judged
 OF_INTERFACES = 0.2  # share of the interfaces in the strain energy of a mode, above which they can damp the mode
-SLOWEST = 0.05  # frequency of any mode below which a stiffness or an inertia is doubtful [Hz]
-SAG = 0.05  # compression of the spring of an interface at rest above which its stiffness is doubtful [m]
 
 
 class Floor(NamedTuple):
@@ -119,19 +131,70 @@ class Floor(NamedTuple):
     gyration: float
 
 
-def _damping(building: Building) -> Iterator[Reading]:
+def _damping(scene: BuildingScene) -> Iterator[Reading]:
     """Damping ratio of the first mode on a fixed base."""
-    fixed = building.fixed
+    building, fixed = scene.building, scene.building.fixed
     if len(fixed.frequencies) and fixed.frequencies[0] > 0:
         mode = fixed.modes[:, 0]
         ratio = mode @ building.damping[np.ix_(fixed.inner, fixed.inner)] @ mode / (2 * fixed.frequencies[0])
         yield Reading(0, float(ratio), float(ratio))
 
 
-def _frequency(building: Building) -> Iterator[Reading]:
+def _frequency(scene: BuildingScene) -> Iterator[Reading]:
     """Lowest frequency on a fixed base [Hz]."""
-    if len(building.frequencies):
-        yield Reading(0, float(building.frequencies[0]), float(building.frequencies[0]))
+    if len(scene.building.frequencies):
+        yield Reading(0, float(scene.building.frequencies[0]), float(scene.building.frequencies[0]))
+
+
+def _floor_mass(scene: BuildingScene) -> Iterator[Reading]:
+    """Masses of the floors of a frame over their mean."""
+    frame = floors(scene.building)
+    for index, floor in enumerate(frame):
+        mean = float(np.mean([floor.mass for floor in frame]))
+        yield Reading(0, floor.mass, floor.mass / mean, {"path": _path(index)})
+
+
+def _gyration(scene: BuildingScene) -> Iterator[Reading]:
+    """Radii of gyration of the floors of a frame over the largest distance of two bearings."""
+    places = scene.places
+    widest = float(np.linalg.norm(places[:, None] - places, axis=-1).max())
+    for mass, floor in zip(_floor_mass(scene), floors(scene.building), strict=True):
+        if mass.measure >= LIGHT and widest > 0:
+            yield Reading(0, floor.gyration, floor.gyration / widest, {**mass.words, "widest": widest})
+
+
+def _heights(scene: BuildingScene) -> Iterator[Reading]:
+    """Heights of the storeys of a frame [m]."""
+    if scene.building.columns:
+        levels = [float(node.position[2]) for node in scene.building.nodes]
+        for index, (below, above) in enumerate(pairwise(levels), start=1):
+            yield Reading(0, above - below, above - below, {"path": _path(index)})
+
+
+def _storey_drifts(scene: BuildingScene) -> Iterator[Reading]:
+    """Drifts of the storeys of a frame under `SHARE` of gravity, over their heights."""
+    heights = list(_heights(scene))
+    drifts = _drifts(scene.building, SHARE * scene.gravity) if heights else np.zeros(0)
+    for (_, height, _, words), drift in zip(heights, drifts, strict=True):
+        if height <= HEIGHT:
+            yield Reading(0, float(drift), float(drift) / height, words)
+
+
+def _sag(scene: BuildingScene) -> Iterator[Reading]:
+    """The spring of the interface that is compressed most at rest, by its compression [m]."""
+    springs = np.array([mount.interface.vertical_stiffness for mount in scene.bearings])
+    sags = scene.axial_loads / springs
+    mount = int(sags.argmax())
+    yield Reading(0, float(springs[mount]), float(sags[mount]), {"mount": mount})
+
+
+def _slowest(scene: BuildingScene) -> Iterator[Reading]:
+    """Lowest frequency of the modes in which the building rocks or heaves on its interfaces [Hz]."""
+    modes = scene.vertical_modes
+    squares = modes.squares[modes.shares > OF_INTERFACES]
+    if len(squares):
+        frequency = float(np.sqrt(max(squares.min(), 0.0)) / (2 * np.pi))
+        yield Reading(0, frequency, frequency)
 
 
 OF_BUILDING = (
@@ -140,48 +203,81 @@ OF_BUILDING = (
         (-np.inf, 0.2),
         "building.damping_ratio: the first mode on a fixed base has {value:.3g} of critical damping; is it a fraction, "
         "such as 0.05 for 5 per cent?",
+        (-np.inf, 1.0),
     ),
     Check(
         _frequency,
-        (SLOWEST, np.inf),
+        (0.05, np.inf),
         "building: the lowest frequency on a fixed base is {value:.3g} Hz; are stiffnesses in N/m and N m/rad, of "
         "torsion and rocking too?",
+        (0.02, np.inf),
+    ),
+    Check(
+        _floor_mass,
+        (LIGHT, np.inf),
+        "{path}.mass = {value:g} kg is {measure:.2g} of the mean of all floors; is it in kg, not in t?",
+        (0.003, np.inf),
+    ),
+    Check(
+        _gyration,
+        (-np.inf, 1.0),
+        "{path}.inertia: about E3 the radius of gyration is {value:.3g} m, the bearings are at most {widest:.3g} m "
+        "apart; is it mass times radius squared [kg m^2]?",
+        (-np.inf, 10.0),
+    ),
+    Check(
+        _heights,
+        (-np.inf, HEIGHT),
+        "{path}.height = {value:g} m is unusually high; is it in m, not in mm?",
+        (-np.inf, 100.0),
+    ),
+    Check(
+        _storey_drifts,
+        (-np.inf, 0.05),
+        f"{{path}}.stiffness: under {SHARE:g} g the storey drifts by {{measure:.0%}} of its height; is it in N/m, not "
+        "in kN/m?",
+        (-np.inf, 0.3),
+    ),
+    Check(
+        _sag,
+        (-np.inf, 0.05),
+        "building.bearing[{mount}].interface.vertical_stiffness = {value:g} N/m: the building settles by {measure:.3g} "
+        "m at rest; is it in N/m, not in kN/m?",
+        (-np.inf, 0.5),
+    ),
+    Check(
+        _slowest,
+        (0.05, np.inf),
+        "building: on the vertical springs of its interfaces it rocks or heaves at {value:.3g} Hz; are their "
+        "stiffnesses in N/m, positions in m, and moments of inertia in kg m^2?",
+        (0.02, np.inf),
     ),
 )
-"""Checks of a superstructure."""
+"""Checks of a superstructure and of its interfaces."""
 
 
-def _of_run(scene: BuildingScene) -> Subject:
-    """What is judged of the run of a building: the bearing with the largest load at rest, ground and limits."""
+def _judged_building(scene: BuildingScene) -> Iterator[tuple[Doubt, bool]]:
+    """What `judged` finds in a building: its limits on the bearing with the largest load at rest, ground, structure."""
     heaviest = int(np.argmax(scene.axial_loads))
     bearing, load = scene.bearings[heaviest].bearing, float(scene.axial_loads[heaviest])
-    return Subject(bearing, load, motion=scene.first_ground, limits=scene.limits)
+    yield from judged(OF_RUN, Subject(bearing, load, limits=scene.limits))
+    yield from judged(OF_MOTION, scene.first_ground)
+    yield from judged(OF_BUILDING, scene)
 
 
 def refusals(scene: BuildingScene) -> list[str]:
     """The texts of the doubts about values that no unit can make right, each once for all bearings of one kind."""
-    found = [text for (_, _, text), refused in judged(OF_RUN, _of_run(scene)) if refused]
-    kinds = {mount.bearing: float(load) for mount, load in zip(scene.bearings, scene.axial_loads, strict=True)}
-    for bearing, load in kinds.items():
-        found += [text for (_, _, text), refused in judged(OF_BEARING, Subject(bearing, load)) if refused]
+    found = [text for (_, _, text), refused in _judged_building(scene) if refused]
+    loads = zip(scene.bearings, scene.axial_loads, strict=True)
+    kinds = {(mount.bearing, _has_rims(mount)): float(load) for mount, load in loads}
+    for (bearing, rims), load in kinds.items():
+        found += [text for (_, _, text), refused in judged(OF_BEARING, Subject(bearing, load, rims)) if refused]
     return found
 
 
-def building_doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
+def building_doubts(scene: BuildingScene) -> Iterator[Doubt]:
     """Doubtful values of a building: 0 (no surface), the value, and the text of the doubt with the likely unit."""
-    yield from (doubt for doubt, _ in (*judged(OF_RUN, _of_run(scene)), *judged(OF_BUILDING, scene.building)))
-    yield from _floor_doubts(scene)
-    yield from _storey_doubts(scene.building, scene.gravity)
-    springs = np.array([mount.interface.vertical_stiffness for mount in scene.bearings])
-    sags = scene.axial_loads / springs
-    index = int(sags.argmax())
-    if sags[index] > SAG:
-        text = (
-            f"building.bearing[{index}].interface.vertical_stiffness = {springs[index]:g} N/m: the building settles by "
-            f"{sags[index]:.3g} m at rest; is it in N/m, not in kN/m?"
-        )
-        yield 0, float(springs[index]), text
-    yield from _soft(scene)
+    yield from (doubt for doubt, _ in _judged_building(scene))
     yield from _undamped(scene)
 
 
@@ -220,42 +316,6 @@ def _path(index: int) -> str:
     return "building.base" if index == 0 else f"building.storey[{index - 1}]"
 
 
-def _floor_doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
-    frame = floors(scene.building)
-    if not frame:
-        return
-    mean = float(np.mean([floor.mass for floor in frame]))
-    places = scene.places
-    widest = float(np.linalg.norm(places[:, None] - places, axis=-1).max())
-    for index, floor in enumerate(frame):
-        if floor.mass < LIGHT * mean:
-            text = f"{_path(index)}.mass = {floor.mass:g} kg is {floor.mass / mean:.2g} of the mean of all floors"
-            yield 0, floor.mass, f"{text}; is it in kg, not in t?"
-        elif widest > 0 and floor.gyration > GYRATION * widest:
-            text = (
-                f"{_path(index)}.inertia: about E3 the radius of gyration is {floor.gyration:.3g} m, the bearings are "
-                f"at most {widest:.3g} m apart; is it mass times radius squared [kg m^2]?"
-            )
-            yield 0, floor.gyration, text
-
-
-def _storey_doubts(building: Building, gravity: float) -> Iterator[tuple[int, float, str]]:
-    if not building.columns:
-        return
-    levels = [float(node.position[2]) for node in building.nodes]
-    drifts = _drifts(building, SHARE * gravity)
-    for index, (below, above) in enumerate(pairwise(levels)):
-        height = above - below
-        if height > HEIGHT:
-            yield 0, height, f"{_path(index + 1)}.height = {height:g} m is unusually high; is it in m, not in mm?"
-        elif drifts[index] > DRIFT * height:
-            text = (
-                f"{_path(index + 1)}.stiffness: under {SHARE:g} g the storey drifts by {drifts[index] / height:.0%} of "
-                "its height; is it in N/m, not in kN/m?"
-            )
-            yield 0, float(drifts[index]), text
-
-
 def _drifts(building: Building, acceleration: float) -> Array:
     """Largest drift of every storey on a fixed base under a lateral acceleration, shape (storeys,) [m]."""
     # acceleration: along E1 or E2 [m/s^2].
@@ -267,19 +327,7 @@ def _drifts(building: Building, acceleration: float) -> Array:
     return drifts
 
 
-def _soft(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
-    """A doubt where the building rocks or heaves on its interfaces more slowly than any building does."""
-    modes = scene.vertical_modes
-    squares = modes.squares[modes.shares > OF_INTERFACES]
-    if len(squares) and (frequency := float(np.sqrt(max(squares.min(), 0.0)) / (2 * np.pi))) < SLOWEST:
-        text = (
-            f"building: on the vertical springs of its interfaces it rocks or heaves at {frequency:.3g} Hz; are their "
-            "stiffnesses in N/m, positions in m, and moments of inertia in kg m^2?"
-        )
-        yield 0, frequency, text
-
-
-def _undamped(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
+def _undamped(scene: BuildingScene) -> Iterator[Doubt]:
     """A doubt where a mode that the interfaces can damp has less than `LEAST_DAMPING` of critical damping."""
     # Yields 0 (no surface), the least damping ratio, and the text with the damping that suffices.
     modes = scene.vertical_modes

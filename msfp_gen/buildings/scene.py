@@ -379,6 +379,12 @@ class BuildingScene(Printed, OtherSystem):
 
         return refusals(self)
 
+    def doubts(self) -> list[str]:
+        """What is hardly meant, also what is not refused; see `scene.plausibility.doubts`."""
+        from msfp_gen.buildings.notes import doubt_notes
+
+        return [note.text for note in doubt_notes(self)]
+
     def columns(self) -> Places:
         """The columns of a table of all rows; see `results.dataset.columns`."""
         from msfp_gen.buildings.dataset import columns

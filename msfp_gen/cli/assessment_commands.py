@@ -21,6 +21,7 @@ from msfp_gen.cli.console import (
     interruptible,
     load_source,
     note,
+    note_doubts,
     note_exceeded,
     note_written,
     result_of,
@@ -110,14 +111,15 @@ def bound(
         raise InputError(f"--{'leave-out' if leave_out else 'workers'}: it is for the runs of a suite; give --suite")
     from msfp_gen.common.output import make_folder
     from msfp_gen.scene.file.source import load_scene
-    from msfp_gen.scene.plausibility import require_meant
+    from msfp_gen.scene.plausibility import doubts, require_meant
     from msfp_gen.studies.bounding import load_factors
     from msfp_gen.studies.bounding import runs as module
 
     chosen = load_scene(scene)
     table = module.factors_of(chosen) if factors is None else load_factors(factors)
     require_meant(chosen, force=force)  # before anything is written
-    module.bounded_scenes(chosen, table)  # refuses a table that does not fit the bearing before anything is written
+    cases = module.bounded_scenes(chosen, table)  # refuses a table that does not fit before anything is written
+    note_doubts([(name, doubts(case)) for name, case in cases.items()])
     if output is not None:
         make_folder(output, "--output")
     build(chosen)
@@ -163,20 +165,24 @@ def _bound_suite(
     from msfp_gen.common.output import make_folder
     from msfp_gen.scene.file.source import load_scene
     from msfp_gen.scene.plausibility import require_meant
-    from msfp_gen.studies.bounding import CASES, factors_of
+    from msfp_gen.studies.bounding import factors_of
     from msfp_gen.studies.bounding import suite as module
 
     chosen = factors_of(load_scene(scene)).name if factors is None else factors
     with Progress("suite") as progress:
         study = module.suite_study(scene, suite, chosen, progress)
     module.check_left_out(leave_out, study)
-    require_meant(*map(study.scene, range(len(CASES), study.runs + 1, len(CASES))), force=force)
+    scenes = module.suite_scenes(study, leave_out)
+    require_meant(*(scene for _, scene in scenes), force=force)
+    note_doubts(module.suite_doubts(study, scenes))
     if output is not None:
         make_folder(output, "--output")
     build(study.scene(1))
     count = len(study.inputs.records) - len(set(leave_out))
     with interruptible(output), Progress(f"{count} record{'s' * (count > 1)} at their bounds") as update:
-        bounds = module.bound_suite(study, output, leave_out=leave_out, workers=workers, progress=update)
+        bounds = module.bound_suite(  # force: values have been judged
+            study, output, leave_out=leave_out, workers=workers, force=True, progress=update
+        )
     answer(bounds.as_dict(), module.suite_bound_tables(bounds), as_json)
     if output is not None:
         module.plot_suite_bounds(bounds, output / "suite.png")

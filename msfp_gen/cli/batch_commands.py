@@ -20,6 +20,7 @@ from msfp_gen.cli.console import (
     Workers,
     answer,
     note,
+    note_doubts,
     note_written,
     number,
     numbers,
@@ -78,7 +79,7 @@ def batch(
 ) -> None:
     """Simulate many scenes, or one with fields varied, on all cores. Ctrl-C keeps the runs that have ended."""
     from msfp_gen.scene.file.loader import load_suite
-    from msfp_gen.scene.plausibility import require_meant
+    from msfp_gen.scene.plausibility import doubts, require_meant, target_doubts
     from msfp_gen.studies.batch import ENDED
     from msfp_gen.studies.sweep import variations, varied_field
 
@@ -87,9 +88,13 @@ def batch(
         check_output(table, TABLE_SUFFIXES, "--table")
     fields = [varied_field(text) for text in vary or ()]
     with Progress("suite") as progress:
-        records = () if suite is None else load_suite(suite, progress).records
+        loaded = None if suite is None else load_suite(suite, progress)
+    records, target = ((), None) if loaded is None else (loaded.records, loaded.target)
     chosen = [variation for source in sources for variation in variations(source, fields, records)]
-    require_meant(*(variation.scene for variation in chosen), force=force)
+    made = [variation.scene for variation in chosen]
+    require_meant(*made, force=force)
+    about = target_doubts(target)
+    note_doubts([(scene.name, [*about, *doubts(scene)]) for scene in made])
     rows: list[Row] = []
     with _reported(rows, len(chosen), table, as_json), using_sign(sign):
         _run(chosen, workers, output, rows)

@@ -7,7 +7,7 @@ import json
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import wraps
@@ -134,6 +134,14 @@ def note_exceeded(verdicts: Mapping[str, Verdict]) -> None:
     for name, verdict in verdicts.items():
         if verdict.exceeded:
             note(f"{name}{': ' if name else ''}limits of the device {verdict.text}")
+
+
+def note_doubts(runs: Sequence[tuple[str, Sequence[str]]]) -> None:
+    """One line for all runs with a doubt of one kind. runs: names with the texts of the doubts of each run."""
+    from msfp_gen.scene.plausibility import doubt_lines
+
+    for line in doubt_lines(runs):
+        note(line)
 
 
 def fail(message: str, code: int) -> int:

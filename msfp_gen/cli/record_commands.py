@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, note_written, number, show
+from msfp_gen.cli.console import Progress, note, note_doubts, note_written, number, show
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 
@@ -93,6 +93,7 @@ def record(
         raise InputError("--as-is: excludes correction; leave out --correct and --corner")
     from msfp_gen.motions.records import Corrected, ScaleTo
     from msfp_gen.motions.records.record_tables import record_tables
+    from msfp_gen.scene.plausibility import target_doubts
 
     target = None if scale_to is None else ScaleTo.parse(scale_to)
     raw = _turned(_read(files, unit, time_step), components, rotated_by)
@@ -100,6 +101,7 @@ def record(
     corrected, factor = _prepared(raw, target, start, duration, not as_is, corner) if process else (None, 1.0)
     motion = raw if corrected is None else corrected if target is None else corrected.scaled(factor)
     show(record_tables(raw, motion))
+    note_doubts([("", target_doubts(None if target is None else vars(target)))])
     if plot is not None and isinstance(motion, Corrected):
         from msfp_gen.figures import plot_correction
 
@@ -123,6 +125,7 @@ def suite(
         check_output(spectrum, FIGURE_SUFFIXES, "--spectrum")
     from msfp_gen.motions.records.record_tables import suite_tables
     from msfp_gen.scene.file.loader import load_suite
+    from msfp_gen.scene.plausibility import motion_doubts, target_doubts
 
     with Progress("spectra") as progress:
         loaded = load_suite(file, progress)
@@ -130,6 +133,8 @@ def suite(
         raise InputError(f"--spectrum: {file} has no [scale_to] with sds, sd1 and between; give one")
     names, motions = [record.name for record in loaded.records], [record.motion for record in loaded.records]
     show(suite_tables(names, motions, loaded.scaled))
+    about = target_doubts(loaded.target)
+    note_doubts([(name, [*about, *motion_doubts(motion)]) for name, motion in zip(names, motions, strict=True)])
     if spectrum is not None and loaded.scaled is not None:
         from msfp_gen.figures import plot_response_spectrum
 

@@ -15,6 +15,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite, positive, samples
 from msfp_gen.motions.piecewise import ORDER, Pieces, from_rates, hermite5
 
+ACCELERATION_SAMPLES = "acceleration samples, piecewise linear"  # the source in the metadata of such a motion
 _REST_SHARE = 1e-3  # an end is taken to be at rest if its velocity is at most this share of the peak velocity
 
 
@@ -45,7 +46,7 @@ def from_acceleration(time: ArrayLike, acceleration: ArrayLike) -> Pieces:
     rate[:, :3] = samples("acceleration", acceleration, (len(times), 3))
     steps = np.diff(times)[:, None] * (rate[1:] + rate[:-1]) / 2
     velocity = np.concatenate([np.zeros((1, 6)), np.cumsum(steps, axis=0)])
-    metadata |= {"source": "acceleration samples, piecewise linear"}
+    metadata |= {"source": ACCELERATION_SAMPLES}
     return Pieces(times, from_rates(times, velocity, rate), resolving_step(times), metadata)
 
 

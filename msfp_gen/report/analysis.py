@@ -28,13 +28,14 @@ from msfp_gen.report.compared import compared_table
 from msfp_gen.report.frames import picture, render, write_page
 from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of, terms_shown
 from msfp_gen.report.repeated import plot_loops, plot_vertical, repeat_words, repeated, vertical_table
-from msfp_gen.scene.explain import explain
+from msfp_gen.scene.explain import DOUBTFUL, explain
 from msfp_gen.scene.file.loader import bearing_from_table, bearing_tables, parsed_sheet
+from msfp_gen.scene.plausibility import runs_of_doubts
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.sheet import Sheet
 from msfp_gen.studies.bounding import CASES, SuiteBounds, load_suite_bounds
 from msfp_gen.studies.bounding.runs import shown_as
-from msfp_gen.studies.bounding.suite import plot_suite_bounds, suite_bound_tables
+from msfp_gen.studies.bounding.suite import plot_suite_bounds, suite_bound_tables, suite_doubts, suite_scenes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -154,13 +155,19 @@ def _numbered(sections: Sequence[Section]) -> Iterator[dict[str, Any]]:
         }
 
 
+def doubt_table(study: Study, bounds: SuiteBounds) -> list[Table]:
+    """The values of all runs that are hardly meant, with their records; no table without any."""
+    found = runs_of_doubts(suite_doubts(study, suite_scenes(study, bounds.left_out)))
+    rows = [("all" if len(names) == len(bounds.records) else ", ".join(names), text) for text, names in found.items()]
+    return [Table(DOUBTFUL, ("records", "value"), rows)] if rows else []
+
+
 def _sections(study: Study, bounds: SuiteBounds, rows: Any, scene: Any) -> Iterator[Section]:
     first, *others = suite_bound_tables(bounds)
     figure = plot_suite_bounds(bounds)
     caption = "Main quantities over the bounds, each record in a colour of its own"
-    yield Section(
-        "Envelope over records and bounds", (), [first, *others, limit_table(bounds, rows)], [(caption, figure)]
-    )
+    tables = [*doubt_table(study, bounds), first, *others, limit_table(bounds, rows)]
+    yield Section("Envelope over records and bounds", (), tables, [(caption, figure)])
     yield _bearing_section(study, scene)
     tables, figures = structure_of(scene, study.table["scene"])
     yield Section("Superstructure", (), tables, figures)
@@ -201,7 +208,8 @@ def _last_sections(study: Study, bounds: SuiteBounds, rows: Any, scene: Any) -> 
     if any("sheet" in given for given in bearing_tables(study.table["scene"]).values()):
         kinds.add("sheet")
     yield Section("Which parts of the program were compared with what", (words,), [compared_table(kinds)])
-    yield Section("Settings", (), [*explain(scene), _files(study)])
+    settings = (table for table in explain(scene) if not table.title.endswith(DOUBTFUL))  # of all runs: `doubt_table`
+    yield Section("Settings", (), [*settings, _files(study)])
 
 
 def _spectra_section(rows: Any) -> Section:

@@ -48,8 +48,10 @@ BODY_COLUMNS = {
 # Number in `Motion.metadata`, which describes the origin of a motion -> unit; other numbers have no unit.
 MOTION_UNITS = {
     "amplitude": "m", "period": "s", "lead_in": "s", "acceleration": "m/s^2", "initial_speed": "m/s",
-    "start_time": "s", "window_start": "s", "end_offset": "m",
+    "start_time": "s", "window_start": "s", "end_offset": "m", "pga": "m/s^2", "sa": "m/s^2", "sds": "m/s^2",
+    "ag": "m/s^2",
 }  # fmt: skip
+DOUBTFUL = "values that are hardly meant"  # title of the table
 METHODS = {
     "implicit": "L-stable, states and unknowns solved together",
     "esdirk4": "L-stable of order 4, for tight tolerances",
@@ -115,7 +117,7 @@ def doubt_tables(doubts: Iterable[tuple[int, float, str]]) -> Iterator[Table]:
     """A table of doubtful values, as in `plausibility.doubtful_values`; none without any."""
     rows = [(text,) for _, _, text in doubts]
     if rows:
-        yield Table("values that are hardly meant", ("value",), rows)
+        yield Table(DOUBTFUL, ("value",), rows)
 
 
 def body_table(bearing: Bearing) -> Table:

@@ -6,7 +6,8 @@ that is off by a thousand, is refused by the command line unless it is told to r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import singledispatch
 from itertools import pairwise
 from math import inf, pi
@@ -17,6 +18,7 @@ import numpy as np
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import G
 from msfp_gen.motions.motion import Motion
+from msfp_gen.motions.sources import ACCELERATION_SAMPLES
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import load_at_rest
 from msfp_gen.scene.scene import Scene
@@ -30,8 +32,10 @@ Doubt = tuple[int, float, str]  # number of the surface, 0: none; the value; the
 Range = tuple[float, float]
 LEAST_DAMPING = 0.01  # ratio of a vibration on vertical springs below which what it adds depends on the tolerance
 USUAL_DAMPING = 0.02  # ratio that is named as the remedy
+RADII = (0.05, 20.0)  # usual, of a surface [m]
 RIM_LOAD = 1 / 3  # of the load at rest, which a rim must bear
 SOFTEST_RIM = 0.5  # compression of a rim by this load, over the capacity
+BARE_DIGITS = 3  # significant digits at most of a number that was given in m/s^2; "0.15 g" has seven there
 
 
 class Subject(NamedTuple):
@@ -40,7 +44,6 @@ class Subject(NamedTuple):
     bearing: Bearing
     load: float = 0.0
     rims: bool = True
-    motion: Motion | None = None
     limits: Limits | None = None
     top: Top | None = None
 
@@ -57,8 +60,8 @@ class Reading(NamedTuple):
 class Check(NamedTuple):
     """A value, its usual range, and the text of the note outside of it.
 
-    read: of a `Subject`, or of a building. text: with {index} of surface or body from 0, {value}, {measure} and the
-    words of the reading. refused: range beyond which no unit can be right.
+    read: of a `Subject`, a motion, a target or a building. text: with {index} of surface or body from 0, {value},
+    {measure} and the words of the reading. refused: range beyond which no unit can be right.
     """
 
     read: Callable[[Any], Iterator[Reading]]
@@ -76,6 +79,13 @@ def _of_surfaces(name: str, over: str = "") -> Callable[[Subject], Iterator[Read
             yield Reading(number, value, value / getattr(surface, over) if over else value)
 
     return read
+
+
+def _tilt(subject: Subject) -> Iterator[Reading]:
+    """Capacities over the radii of their surfaces, where these are usual [rad]."""
+    for reading, surface in zip(_of_surfaces("capacity", "radius")(subject), subject.bearing.surfaces, strict=True):
+        if RADII[0] <= surface.radius <= RADII[1]:
+            yield reading
 
 
 def _rim_stiffness(subject: Subject) -> Iterator[Reading]:
@@ -135,42 +145,63 @@ def _gravity(subject: Subject) -> Iterator[Reading]:
     yield Reading(0, subject.bearing.gravity, subject.bearing.gravity)
 
 
-def _limits(name: str) -> Callable[[Subject], Iterator[Reading]]:
+def _of_load(subject: Subject) -> float:
+    return subject.load
+
+
+def _of_capacity(subject: Subject) -> float:
+    return sum(surface.capacity for surface in subject.bearing.surfaces)
+
+
+def _limits(name: str, over: Callable[[Subject], float] = lambda _: 1.0) -> Callable[[Subject], Iterator[Reading]]:
     """Reads a limit of the device, and judges it over the capacity of all surfaces together or the load at rest."""
 
     def read(subject: Subject) -> Iterator[Reading]:
-        value = getattr(subject.limits, name, None)
-        of = subject.load if name == "axial_load" else sum(s.capacity for s in subject.bearing.surfaces)
+        value, of = getattr(subject.limits, name, None), over(subject)
         if value is not None and of > 0:
             yield Reading(0, value, value / of, {"of": of})
 
     return read
 
 
-def _record(motion: Motion | None) -> bool:
-    """Whether a motion comes from the file of a record."""
-    return motion is not None and "format" in motion.metadata
+def _remedy(motion: Motion) -> str:
+    """What to check in the samples of an acceleration; "" for a motion that has none."""
+    if "format" in motion.metadata:
+        return "are the unit of the record and motion.scale right?"
+    return "is the unit of its samples right?" if motion.metadata.get("source") == ACCELERATION_SAMPLES else ""
 
 
-def _peak(subject: Subject) -> Iterator[Reading]:
-    """Largest horizontal acceleration of a record, in g."""
-    if subject.motion is not None and _record(subject.motion):
-        peak = float(np.linalg.norm(subject.motion.acceleration(subject.motion.knots)[:, :2], axis=1).max())
+def _peak(motion: Motion) -> Iterator[Reading]:
+    """Largest horizontal acceleration of samples, in g."""
+    if remedy := _remedy(motion):
+        peak = float(np.linalg.norm(motion.acceleration(motion.knots)[:, :2], axis=1).max())
         if peak > 0:
-            yield Reading(0, peak, peak / G)
+            yield Reading(0, peak, peak / G, {"remedy": remedy})
 
 
-def _sampling(subject: Subject) -> Iterator[Reading]:
-    """Median time between the samples of a record [s]."""
-    if subject.motion is not None and _record(subject.motion):
-        step = float(np.median(np.diff(subject.motion.knots)))
+def _sampling(motion: Motion) -> Iterator[Reading]:
+    """Median time between the samples of an acceleration [s]."""
+    if _remedy(motion):
+        step = float(np.median(np.diff(motion.knots)))
         yield Reading(0, step, step)
 
 
-def _scale(subject: Subject) -> Iterator[Reading]:
-    if subject.motion is not None and _record(subject.motion):
-        scale = float(subject.motion.metadata.get("scale", 1.0))
-        yield Reading(0, scale, abs(scale))
+def _scale(motion: Motion) -> Iterator[Reading]:
+    scale = float(motion.metadata.get("scale", 1.0))
+    yield Reading(0, scale, abs(scale))
+
+
+def _bare(target: Mapping[str, Any], path: str = "scale_to") -> Iterator[Reading]:
+    """The acceleration of a target of scaling [m/s^2] that was given without a unit, over the least usual one."""
+    for name, least in LEAST_TARGETS.items():
+        value = target.get(name)
+        if isinstance(value, float) and value == float(f"{value:.{BARE_DIGITS}g}"):
+            yield Reading(0, value, value / least, {"path": f"{path}.{name}", "in_g": value / G})
+
+
+def _bare_of_motion(motion: Motion) -> Iterator[Reading]:
+    if "scaled_to" in motion.metadata:
+        yield from _bare(motion.metadata, "motion.scale_to")
 
 
 def _rig(subject: Subject) -> Iterator[Reading]:
@@ -189,20 +220,22 @@ OF_BEARING = (
     ),
     Check(
         _of_surfaces("radius"),
-        (0.05, 20.0),
-        _S + ".radius = {value:g} m is outside 0.05 to 20 m; is it in metres?",
+        RADII,
+        _S + f".radius = {{value:g}} m is outside {RADII[0]:g} to {RADII[1]:g} m; is it in metres?",
         (0.005, 200.0),
     ),
     Check(
-        _of_surfaces("capacity", "radius"),
-        (-inf, 0.5),
+        _tilt,
+        (0.002, 0.5),
         _S + ".capacity = {value:g} m tilts the slider by {measure:.2g} rad; is it the displacement along the surface, "
         "in metres?",
+        (5e-4, inf),  # above a quarter turn it is an error
     ),
     Check(
         _of_surfaces("yield_displacement", "capacity"),
         (-inf, 0.1),
         _S + ".yield_displacement = {value:g} m is more than a tenth of the capacity; usual are 0.1 to 1 mm",
+        (-inf, 1.0),
     ),
     Check(
         _rim_stiffness,
@@ -210,6 +243,7 @@ OF_BEARING = (
         _S
         + ".rim_stiffness = {value:g} N/m stops no slider: compressed by half the capacity, {compressed:.3g} mm, the "
         "rim bears less than a third of the load at rest, {load:.4g} N; is it in N/m, not in kN/mm?",
+        (-inf, 10.0),
     ),
     Check(
         _pressure,
@@ -223,6 +257,7 @@ OF_BEARING = (
         (-inf, 0.7),
         "bearing.{path} = {value:g} m is {measure:.2g} of the radius of its surface; is it the height of the plate at "
         "its axis, in metres?",
+        (-inf, 10.0),
     ),
     Check(
         _nested,
@@ -236,6 +271,7 @@ OF_BEARING = (
         (-inf, 1.0),
         _S + ".radius = {value:g} m exceeds the radius of the surface outside, surfaces[{outer}].radius = {outside:g} "
         "m; surfaces go from the bottom: are outer and inner ones, or m and p of the layout, exchanged?",
+        (-inf, 30.0),
     ),
     Check(
         _gravity,
@@ -247,23 +283,53 @@ OF_BEARING = (
 """Checks of a bearing and of its load at rest."""
 OF_RUN = (
     Check(
-        _limits("displacement"),
+        _limits("displacement", _of_capacity),
         (0.05, 1.5),
         "limits.displacement = {value:g} m is {measure:.3g} times the capacity of all surfaces, {of:.3g} m; is it in "
         "metres?",
         (0.001, 50.0),
     ),
     Check(
-        _limits("axial_load"),
+        _limits("axial_load", _of_load),
         (0.9, 30.0),
         "limits.axial_load = {value:g} N is {measure:.3g} times the load at rest, {of:.4g} N; is it in N, not in kN?",
         (0.01, 1000.0),
     ),
     Check(
+        _limits("rim_force", _of_load),
+        (0.03, 10.0),
+        "limits.rim_force = {value:g} N is {measure:.3g} times the load at rest, {of:.4g} N; is it in N, not in kN?",
+        (0.003, 300.0),
+    ),
+    Check(
+        _limits("rim_compression", _of_capacity),
+        (-inf, 0.5),
+        "limits.rim_compression = {value:g} m is {measure:.3g} times the capacity of all surfaces, {of:.3g} m; is it "
+        "in metres?",
+        (-inf, 1.0),
+    ),
+    Check(
+        _limits("uplift_height"),
+        (-inf, 0.2),
+        "limits.uplift_height = {value:g} m is more than bearings open before they come apart; is it in metres?",
+        (-inf, 1.0),
+    ),
+    Check(
+        _rig,
+        (10.0, inf),
+        "top.stiffness = {value:g} N/m is {measure:.2g} times the stiffness of the bearing, {own:.3g} N/m, so that the "
+        "rig moves instead; is it in N/m, not in kN/m?",
+        (0.5, inf),
+    ),
+)
+"""Checks of the limits of a bearing, and of a rig."""
+LEAST_TARGETS = {"pga": 3.0, "sa": 3.0, "sds": 3.0, "ag": 1.0}  # EN 1998-1 maps a_g in m/s^2, often 1 to 3
+BARE = "{path} = {value:g} m/s^2 is {in_g:.3g} g; give the unit, as in '{value:g} g', if it is meant in g"
+OF_MOTION = (
+    Check(
         _peak,
         (0.02, 3.0),
-        "motion: the peak acceleration of {value:.3g} m/s^2 is {measure:.3g} g; are the unit of the record and "
-        "motion.scale right?",
+        "motion: the peak acceleration of {value:.3g} m/s^2 is {measure:.3g} g; {remedy}",
         (1e-3, 100.0),
     ),
     Check(
@@ -279,15 +345,11 @@ OF_RUN = (
         "in m/s^2? '1.5 g' is a text with its unit",
         (-inf, 300.0),
     ),
-    Check(
-        _rig,
-        (10.0, inf),
-        "top.stiffness = {value:g} N/m is {measure:.2g} times the stiffness of the bearing, {own:.3g} N/m, so that the "
-        "rig moves instead; is it in N/m, not in kN/m?",
-        (0.5, inf),
-    ),
+    Check(_bare_of_motion, (1.0, inf), BARE),
 )
-"""Checks of what acts on a bearing, and of its limits."""
+"""Checks of a motion: of accelerations that were sampled, and of the target of their scaling."""
+OF_TARGET = (Check(_bare, (1.0, inf), BARE),)
+"""Checks of the target of a suite."""
 
 
 def judged(checks: Sequence[Check], subject: Any) -> Iterator[tuple[Doubt, bool]]:
@@ -300,20 +362,22 @@ def judged(checks: Sequence[Check], subject: Any) -> Iterator[tuple[Doubt, bool]
                 yield (number, value, text), not check.refused[0] <= measure <= check.refused[1]
 
 
-def doubtful_values(bearing: Bearing, load: float = 0.0) -> Iterator[Doubt]:
-    """Values of a bearing that are unlikely. load: at rest [N]; 0: not known."""
-    yield from (doubt for doubt, _ in judged(OF_BEARING, Subject(bearing, load)))
+def doubtful_values(bearing: Bearing, load: float = 0.0, rims: bool = True) -> Iterator[Doubt]:
+    """Values of a bearing that are unlikely. load: at rest [N]; 0: not known. rims: whether they are modelled."""
+    yield from (doubt for doubt, _ in judged(OF_BEARING, Subject(bearing, load, rims)))
 
 
-def subject_of(scene: SceneFields) -> Subject:
-    """What is judged in a scene of one bearing."""
+def _judged_scene(scene: SceneFields) -> Iterator[tuple[Doubt, bool]]:
+    """What `judged` finds in a scene of one bearing."""
     rims = scene.effects.rims is not False
-    return Subject(scene.bearing, load_at_rest(scene), rims, scene.motion, scene.limits, scene.top)
+    subject = Subject(scene.bearing, load_at_rest(scene), rims, scene.limits, scene.top)
+    yield from judged((*OF_BEARING, *OF_RUN), subject)
+    yield from judged(OF_MOTION, scene.motion)
 
 
 def scene_doubts(scene: SceneFields) -> Iterator[Doubt]:
     """Doubts about values of a scene, and about the springs that hold its top plate up."""
-    yield from (doubt for doubt, _ in judged((*OF_BEARING, *OF_RUN), subject_of(scene)))
+    yield from (doubt for doubt, _ in _judged_scene(scene))
     yield from unread_values(scene.bearing, scene.effects)
     if standing := standing_of(scene):
         yield from unsteady(*standing[:3])
@@ -347,7 +411,64 @@ def refusals(system: Any) -> list[str]:
 
 @refusals.register(Scene)
 def _refusals_of_bearing(system: Scene) -> list[str]:
-    return [text for (_, _, text), refused in judged((*OF_BEARING, *OF_RUN), subject_of(system)) if refused]
+    return [text for (_, _, text), refused in _judged_scene(system) if refused]
+
+
+@singledispatch
+def doubts(system: Any) -> list[str]:
+    """The texts of the doubts about values of a system, each once, as in the notes of its run."""
+    return list(dict.fromkeys(system.doubts()))
+
+
+@doubts.register(Scene)
+def _doubts_of_bearing(system: Scene) -> list[str]:
+    """None where the pendulum is equivalent to a stack, whose values are not given."""
+    stack = system.fidelity != "equivalent"
+    return list(dict.fromkeys(text for _, _, text in scene_doubts(system) if stack))
+
+
+def motion_doubts(motion: Motion) -> list[str]:
+    """The texts of the doubts about a motion."""
+    return [text for (_, _, text), _ in judged(OF_MOTION, motion)]
+
+
+def target_doubts(target: Mapping[str, Any] | None) -> list[str]:
+    """The texts of the doubts about the target of a suite, a table of the fields of `ScaleTo`; none for None."""
+    return [text for (_, _, text), _ in judged(OF_TARGET, target or {})]
+
+
+def runs_of_doubts(runs: Iterable[tuple[str, Iterable[str]]]) -> dict[str, tuple[str, ...]]:
+    """Text of a doubt -> the names of the runs that have it, each once. runs: names with the texts of each run."""
+    found: dict[str, dict[str, None]] = {}
+    for name, texts in runs:
+        for text in texts:
+            found.setdefault(text, {})[name] = None
+    return {text: tuple(names) for text, names in found.items()}
+
+
+NUMBER = re.compile(r"(?<![\[\d])[-+]?\d[\d.]*(e[-+]?\d+)?")  # but for the index of a surface
+MOST_NAMES = 5  # of other runs in one line
+
+
+def doubt_lines(runs: Sequence[tuple[str, Iterable[str]]]) -> list[str]:
+    """One line for all doubts whose texts differ in numbers only: the first text, with the runs that have one.
+
+    A text of all runs stands without names. runs: names with the texts of each run.
+    """
+    count = len({name for name, _ in runs})
+    kinds: dict[str, list[tuple[str, tuple[str, ...]]]] = {}
+    for text, names in runs_of_doubts(runs).items():
+        kinds.setdefault(NUMBER.sub("", text), []).append((text, names))
+    lines = []
+    for alike in kinds.values():
+        text, names = alike[0]
+        if len(names) == count:
+            lines.append(text)
+            continue
+        first, *others = dict.fromkeys(name for _, names in alike for name in names)
+        more = f" and {len(others) - MOST_NAMES} more" if len(others) > MOST_NAMES else ""
+        lines.append(f"{first}: {text}" + (f"; likewise {', '.join(others[:MOST_NAMES])}{more}" if others else ""))
+    return lines
 
 
 def require_meant(*systems: Any, force: bool = False) -> None:

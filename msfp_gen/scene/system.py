@@ -156,6 +156,10 @@ class OtherSystem(ABC):
         """Why values can hardly be meant; see `scene.plausibility.refusals`."""
         return []
 
+    def doubts(self) -> list[str]:
+        """What is hardly meant, also what is not refused; see `scene.plausibility.doubts`."""
+        return []
+
     def quantities(self) -> dict[str, Any]:
         """What tables report of a run; see `results.quantities.quantities`."""
         return {}

@@ -27,6 +27,7 @@ _ACCELERATION = Quantity("m/s^2", above=0.0)
 _PERIOD = Quantity("s", above=0.0)
 _FIT_POINTS = 100  # number of periods of a fit to a design spectrum, evenly spaced on a logarithmic axis
 _KEYS = ("pga", "sa", "period", "sds", "sd1", "ag", "ground", "spectrum", "between")
+ORDINATES = ("pga", "sa", "sds", "ag")  # of a target [m/s^2], which the metadata of a scaled motion keep
 _TARGETS = {
     "pga": ("pga",),
     "sa and period": ("sa", "period"),
@@ -233,7 +234,8 @@ def prepared(
         return corrected, positive("scale", scale)
     if scale != 1:
         raise InputError(f"scale = {scale!r}: scale_to is given too; give one of them")
-    metadata = {**corrected.metadata, "scaled_to": str(scale_to)}
+    given = {name: value for name in ORDINATES if (value := getattr(scale_to, name)) is not None}
+    metadata = {**corrected.metadata, "scaled_to": str(scale_to), **given}
     return replace(corrected, metadata=metadata), scale_to.factor(corrected, progress)
 
 

@@ -19,19 +19,22 @@ import numpy as np
 from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
+from msfp_gen.common.inputs import expecting
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.figures.style import INK, distinct, headline, page, plain
 from msfp_gen.results.quantities import MOVING, Source
 from msfp_gen.scene.file.catalogue import suggestion
+from msfp_gen.scene.plausibility import doubts, require_meant, target_doubts
 from msfp_gen.studies.batch import ENDED
-from msfp_gen.studies.bounding.runs import CASES, shown_as
+from msfp_gen.studies.bounding.runs import CASES, bounded_scenes, shown_as
 from msfp_gen.studies.columns import names_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from msfp_gen.scene.system import System
     from msfp_gen.studies.definition import Study
 
 Run = tuple[str, str]  # names of a record and of a case
@@ -190,12 +193,35 @@ def suite_study(
     return replace(study, keep=replace(study.keep, names=names), table={**study.table, "keep": list(names)})
 
 
+def suite_scenes(study: Study, leave_out: Collection[str] = ()) -> list[tuple[str, System]]:
+    """Name of the record and scene of every run of `suite_study`, without the records that are left out.
+
+    The scenes have full fidelity: their values are the ones that are given.
+    """
+    from msfp_gen.studies.axes import SceneFactory  # which imports this package
+
+    of_records, of_bounds = study.axes
+    given = {key: value for key, value in study.inputs.scene.items() if key != "fidelity"}
+    factory = SceneFactory(replace(study.inputs, scene=given, axes=(of_records,)))
+    factors = study.inputs.factors[of_bounds.paths[0]]
+    names = [name for name in study.inputs.records if name not in leave_out]
+    with expecting(study.files):
+        return [(name, one) for name in names for one in bounded_scenes(factory.scene((name,)), factors).values()]
+
+
+def suite_doubts(study: Study, scenes: Sequence[tuple[str, System]]) -> list[tuple[str, list[str]]]:
+    """Name and doubts of every one of these `suite_scenes`, and the doubts about the target of the suite in each."""
+    target = target_doubts(study.table["records"].get("target"))
+    return [(name, [*target, *doubts(scene)]) for name, scene in scenes]
+
+
 def bound_suite(
     study: Study,
     output: str | Path | None = None,
     *,
     leave_out: Collection[str] = (),
     workers: int | None = None,
+    force: bool = False,
     progress: Progress | None = None,
 ) -> SuiteBounds:
     """Run the cases of `bound` under each motion of a suite, and keep the quantities of the runs.
@@ -208,14 +234,17 @@ def bound_suite(
         output: folder of the rows, as in `study`; None: they are not kept.
         leave_out: names of records that are neither run nor part of the result.
         workers: runs at the same time; None: one for each core.
+        force: whether to run also with values of a run that are implausible in any unit.
         progress: called with the number of runs done, by earlier calls too, and of all.
 
-    Raises InputError: see `study`, or an unknown record; RunError: no run reached its end.
+    Raises InputError before any run: see `study`, or an unknown record; RunError: no run reached its end.
     """
     from msfp_gen.studies.run import run_on
     from msfp_gen.studies.workers import local_pool
 
     check_left_out(leave_out, study)
+    if not force:
+        require_meant(*(scene for _, scene in suite_scenes(study, leave_out)))
     names = list(study.inputs.records)
     without = [len(CASES) * names.index(name) + case for name in leave_out for case in range(len(CASES))]
     with TemporaryDirectory() as temporary, local_pool(workers) as pool:

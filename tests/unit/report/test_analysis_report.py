@@ -19,7 +19,7 @@ from msfp_gen import InputError, load_scene, simulate
 from msfp_gen.buildings.modes import modes_of
 from msfp_gen.cli import main
 from msfp_gen.report import TitleBlock, analysis_html, write_analysis
-from msfp_gen.report.analysis import limit_table
+from msfp_gen.report.analysis import _last_sections, _sections, doubt_table, limit_table
 from msfp_gen.report.compared import COMPARISONS, compared_table
 from msfp_gen.report.repeated import has_vertical, shear_share
 from msfp_gen.scene.file.source import scene_of
@@ -90,6 +90,25 @@ def test_parts_of_the_report_are_numbered_and_listed(html: str) -> None:
         numbers = [int(n) for n in re.findall(rf"<{tag}>{kind} (\d+)\.", html)]
         assert numbers == list(range(1, len(numbers) + 1)) and len(numbers) > 3
         assert [int(n) for n in re.findall(rf"<li>{kind} (\d+)\.", contents)] == numbers
+
+
+def test_doubtful_values_of_all_runs_are_in_the_first_section(folder: Path) -> None:
+    """With the records that have them, once for all bounds; the settings of one run do not repeat them."""
+    text = SUITE.replace('name = "CCC"', 'name = "CCC", scale = 8.0').split("scale_to")[0]
+    (folder.parent / "doubtful.toml").write_text(text)
+    table = building()
+    table["building"]["damping_ratio"] = 0.5
+    made = suite_study(table, folder.parent / "doubtful.toml", "sheet")
+    _, bounds = load_suite_bounds(folder)  # the records have the same names
+    (table_of_doubts,) = doubt_table(made, bounds)
+    rows = {text.partition(" = ")[0].partition(":")[0]: records for records, text in table_of_doubts.rows}
+    assert rows == {"building.damping_ratio": "all", "motion.scale": "CCC", "motion": "CCC"}
+    assert not doubt_table(made, replace(bounds, left_out=("CCC", "CLC <b>")))
+    scene, rows_of_runs = replace(made.scene(1), name="x"), read_study(folder)
+    first = next(_sections(made, bounds, rows_of_runs, scene))
+    assert first.tables[0] == table_of_doubts and len(first.tables) > 2
+    *_, settings = _last_sections(made, bounds, rows_of_runs, scene)
+    assert len(settings.tables) > 5 and not any("hardly meant" in one.title for one in settings.tables)
 
 
 def test_page_one_names_inputs_author_and_checker(html: str, folder: Path) -> None:

@@ -39,7 +39,16 @@ from msfp_gen.figures.style import COLOURS, distinct
 from msfp_gen.results.quantities import quantities
 from msfp_gen.scene.file.loader import scene_text, toml_table
 from msfp_gen.studies import read_study
-from msfp_gen.studies.bounding import CASES, Bounds, bound, bounded_scenes, factor_tables, load_factors
+from msfp_gen.studies.bounding import (
+    CASES,
+    Bounds,
+    bound,
+    bound_suite,
+    bounded_scenes,
+    factor_tables,
+    load_factors,
+    suite_study,
+)
 from msfp_gen.studies.bounding.factors import _read
 from msfp_gen.studies.bounding.runs import _scaled, bounded_scene, bounding_tables, plot_bounds
 from msfp_gen.studies.workers import Workers
@@ -415,6 +424,77 @@ def test_a_suite_of_a_building_has_the_names_of_its_bearings() -> None:
     ]
     assert parts["storey_shear_1"] == "storey 1" and parts["floor_acceleration_1"] == "base"
     assert parts["peak_force"] == ""
+
+
+SCALED = """
+[[records]]
+bundled = "ridgecrest-2019-ci-clc"
+duration = 6.0
+scale = 8.0
+name = "CLC"
+
+[[records]]
+bundled = "ridgecrest-2019-ci-ccc"
+duration = 6.0
+name = "CCC"
+"""
+
+
+def test_doubtful_values_of_a_suite_are_printed_before_its_runs(tmp_path: Path, capsys: Any, monkeypatch: Any) -> None:
+    """One line for each: of one record with its name, of all runs without; not of a record that is left out."""
+    (tmp_path / "suite.toml").write_text(SCALED)
+    scene = changed_scene("ridgecrest-clc", {"limits": {"displacement": 0.9}})
+    (tmp_path / "scene.toml").write_text(scene_text(scene))
+    given = ["bound", str(tmp_path / "scene.toml"), "--suite", str(tmp_path / "suite.toml"), "--factors", "asce7"]
+    calls = []
+
+    def bound_suite(study: Any, *_: Any, leave_out: Any, **__: Any) -> None:
+        calls.append(leave_out)
+        raise RunError("enough", status="bound")
+
+    monkeypatch.setattr("msfp_gen.studies.bounding.suite.bound_suite", bound_suite)
+    monkeypatch.setattr("msfp_gen.model.model.build_model", lambda *_, **__: None)
+    assert main(given) == 1 and len(calls) == 1
+    said = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("error")]
+    assert [line.partition(" = ")[0] for line in said if "limits.displacement" in line] == ["limits.displacement"]
+    assert [line.partition(" = ")[0] for line in said if "motion.scale =" in line] == ["CLC: motion.scale"]
+    assert len([line for line in said if line.startswith("CLC: motion: the peak acceleration of")]) == 1
+    assert main([*given, "--leave-out", "CLC"]) == 1
+    assert "CLC" not in capsys.readouterr().err
+
+
+def test_a_suite_is_refused_for_values_that_no_unit_makes_right(tmp_path: Path, capsys: Any, monkeypatch: Any) -> None:
+    """In Python and by the command, before anything is written; not for a record that is left out, nor by force."""
+    (tmp_path / "suite.toml").write_text(SCALED.replace("scale = 8.0", "scale = 900.0"))
+    made = suite_study("ridgecrest-clc", tmp_path / "suite.toml", "asce7")
+    ran: list[Any] = []
+    monkeypatch.setattr("msfp_gen.studies.run.run_on", lambda *_, without, **__: ran.append(list(without)))
+    monkeypatch.setattr("msfp_gen.studies.bounding.suite._from_rows", lambda *_: None)
+    monkeypatch.setattr("msfp_gen.model.model.build_model", lambda *_, **__: None)
+    with pytest.raises(InputError, match=r"motion.scale = 900 changes .* force=True"):
+        bound_suite(made, tmp_path / "out")
+    given = ["bound", "ridgecrest-clc", "--suite", str(tmp_path / "suite.toml"), "-o", str(tmp_path / "out")]
+    assert main([*given, "--factors", "asce7"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "motion.scale = 900" in error and "--force" in error
+    assert not ran and not (tmp_path / "out").exists()
+    bound_suite(made, leave_out=["CLC"])
+    bound_suite(made, force=True)
+    assert ran == [[0, 1, 2], []]
+
+
+def test_doubtful_values_of_bounds_are_printed(capsys: Any, monkeypatch: Any, tmp_path: Path) -> None:
+    """Friction that is usual as given, and not at upper bound; gravity, which is the same in every case."""
+    changes = {"bearing.surfaces[0].friction": 0.25, "bearing.gravity": 8.0}
+    path = tmp_path / "scene.toml"
+    path.write_text(scene_text(changed_scene("fenz-test2", changes)))
+    monkeypatch.setattr("msfp_gen.studies.bounding.runs.bound", Mock(side_effect=RunError("enough", status="bound")))
+    assert main(["bound", str(path), "--factors", "asce7"]) == 1
+    said = capsys.readouterr().err.splitlines()
+    assert [line.partition(" = ")[0] for line in said[:-1]] == [
+        "bearing.gravity",
+        "upper: bearing.surfaces[0].friction",
+    ]
 
 
 def statistics(folder: Path) -> dict[str, dict[str, str]]:

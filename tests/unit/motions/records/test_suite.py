@@ -120,6 +120,30 @@ def test_a_suite_scales_its_records_and_its_motions_run(folder: Path, capsys: py
     assert f"{peak:.4f}" in out
 
 
+def test_doubtful_factors_and_targets_of_a_suite_are_printed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By `suite`, and by `batch` before its runs; the target in g, one record too strong, one too weak."""
+    path = folder / "suite.toml"
+    path.write_text('[[records]]\nfile = "a.csv"\nscale = 4\n[[records]]\nfile = "b.csv"\n', encoding="utf-8")
+    (folder / "fine.toml").write_text(SUITE.replace("b.csv", "a.csv"), encoding="utf-8")
+    assert main(["suite", str(path)]) == 0
+    lines = [line for line in capsys.readouterr().err.splitlines() if " = " in line]
+    assert len(lines) == 1 and lines[0].startswith("a: motion.scale = 4 changes the record by more than is usual")
+    assert main(["batch", str(folder / "scene.toml"), "--suite", str(path), "--vary", "duration=0.1,0.2"]) == 0
+    lines = [line for line in capsys.readouterr().err.splitlines() if "motion.scale" in line]
+    assert len(lines) == 1 and "record = a, duration = 0.1: motion.scale = 4 changes" in lines[0]
+    assert lines[0].endswith("; likewise scene, record = a, duration = 0.2")
+    path.write_text(SUITE + TARGET.replace('"0.2 g"', "0.2").replace('"0.1 g"', "0.1"), encoding="utf-8")
+    bare = "scale_to.sds = 0.2 m/s^2 is 0.0204 g; give the unit"
+    assert main(["suite", str(path)]) == 0
+    assert [line for line in capsys.readouterr().err.splitlines() if line.startswith(bare)]
+    assert main(["batch", str(folder / "scene.toml"), "--suite", str(path), "--vary", "duration=0.1"]) == 0
+    assert [line for line in capsys.readouterr().err.splitlines() if line.startswith(bare)]
+    assert main(["record", str(folder / "a.csv"), "--scale-to", "sa=0.5, period=1"]) == 0
+    assert "scale_to.sa = 0.5 m/s^2 is 0.051 g; give the unit" in capsys.readouterr().err
+    assert main(["record", str(folder / "a.csv"), "--scale-to", "sa=0.5 g, period=1"]) == 0
+    assert "scale_to" not in capsys.readouterr().err
+
+
 def test_a_suite_without_a_target_keeps_the_factors_of_its_records(folder: Path) -> None:
     path = folder / "suite.toml"
     path.write_text('[[records]]\nfile = "a.csv"\nscale = 2\n[[records]]\nfile = "a.csv"\n', encoding="utf-8")
