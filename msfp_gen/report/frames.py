@@ -163,6 +163,7 @@ def packed(values: Array) -> dict[str, Any]:
 
 
 RESOLUTION = 110  # dots per inch of the figures
+TALL = 0.8  # height over width, above which a figure needs most of a page
 COLOURS_OF_PICTURE = 128  # lines and their soft edges have fewer; a third of the bytes of all colours
 
 
@@ -185,14 +186,15 @@ def of_texts(table: Table) -> list[bool]:
 
 
 def picture(title: str, figure: Figure) -> dict[str, str]:
-    """A figure as the templates show it: its title and its PNG data."""
+    """A figure as the templates show it: its title, its PNG data, and whether it is tall, for print."""
     from PIL import Image
 
     drawn, data = BytesIO(), BytesIO()
     figure.savefig(drawn, format="png", dpi=RESOLUTION)
     with Image.open(drawn) as image:
         image.convert("RGB").quantize(COLOURS_OF_PICTURE).save(data, "png", optimize=True)
-    return {"title": title, "png": base64.b64encode(data.getvalue()).decode("ascii")}
+    shape = "tall" if figure.get_figheight() > TALL * figure.get_figwidth() else "low"
+    return {"title": title, "png": base64.b64encode(data.getvalue()).decode("ascii"), "shape": shape}
 
 
 ASSETS = files(__package__) / "assets"
