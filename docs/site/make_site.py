@@ -26,6 +26,7 @@ PAGES = (
 FILES = ("LICENSE", "CITATION.cff", "examples", "docs/figures", "benchmarks/isolation", ".github/workflows")
 SOURCES = r"\]\(\.\./((?:generator|msfp_gen)/[^)#]+)\)"  # links of pages to the code
 EXPLORER = "<!-- explorer -->\n"  # where it stands on the page of the bearing
+REPORT = "<!-- report -->\n"  # where the page of the hospital leads to a report
 EXAMPLES = r"\]\(((?:\.\./)?)examples(?:/gallery/(\w+/\w+)\.py)?\)"  # links to the examples, or to one of the gallery
 
 
@@ -34,7 +35,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "build" / "docs")
     parser.add_argument(
-        "--no-gallery", action="store_true", help="leave out the examples and the explorer, which run code otherwise"
+        "--no-gallery", action="store_true", help="leave out examples, explorer and report, which run code otherwise"
     )
     given = parser.parse_args()
     with TemporaryDirectory() as folder:
@@ -80,6 +81,9 @@ def collect(source: Path, *, gallery: bool) -> None:
     page = source / "docs" / "bearing.md"
     text = page.read_text(encoding="utf-8")
     page.write_text(text.replace(EXPLORER, explorer(text, source / "_static") if live else ""), encoding="utf-8")
+    page = source / "docs" / "hospital.md"
+    text = page.read_text(encoding="utf-8")
+    page.write_text(text.replace(REPORT, report(source / "_static") if gallery else ""), encoding="utf-8")
     (source / "cli.md").write_text(command_page(), encoding="utf-8")
     for name in () if gallery else ("start.md", "buildings.md"):
         page = source / name
@@ -93,14 +97,32 @@ def explorer(page: str, folder: Path) -> str:
     with TemporaryDirectory() as name:
         scene = Path(name) / "scene.toml"
         scene.write_text((SITE / "explorer.toml").read_text(encoding="utf-8") + sheet, encoding="utf-8")
-        command = [sys.executable, "-m", "msfp_gen", "explore", str(scene), "-o", str(folder / "explorer.html")]
-        if (done := subprocess.run(command, cwd=ROOT, text=True, capture_output=True)).returncode:
-            raise SystemExit(done.stderr)
+        program("explore", scene, "-o", folder / "explorer.html")
     return (
         "Move a control, and this bearing runs again in your browser ([explorer](figures.md#the-explorer)):\n\n"
         '<iframe class="explorer" src="../_static/explorer.html" title="Explorer of this bearing" loading="lazy">'
         "</iframe>\n"
     )
+
+
+def report(folder: Path) -> str:
+    """Write the report of a suite of two short records into a folder; returns what the page of the hospital says."""
+    with TemporaryDirectory() as name:
+        runs = Path(name) / "analysis"
+        program("bound", SITE / "two-storeys.toml", "--suite", SITE / "two-records.toml", "-o", runs)
+        program("report", runs, "-o", folder / "report.html", "--project", "Building of the documentation",
+                "--author", "an engineer", "--checker", "another engineer")  # fmt: skip
+    return (
+        '<a href="../_static/report.html">The report of a suite of two short records</a>, on a smaller building, shows '
+        "what the last command writes.\n\n"
+    )
+
+
+def program(*words: object) -> None:
+    """Run a command of msfp-gen. Raises SystemExit with its message where it fails."""
+    command = [sys.executable, "-m", "msfp_gen", *map(str, words)]
+    if (done := subprocess.run(command, cwd=ROOT, text=True, capture_output=True)).returncode:
+        raise SystemExit(done.stderr)
 
 
 def command_page() -> str:

@@ -38,7 +38,7 @@ class Modes(NamedTuple):
 
 
 def modes_of(scene: BuildingScene) -> Modes:
-    """The modes of the building of a scene."""
+    """The modes of the building of a scene, which is not reduced to its lowest modes."""
     building = scene.building
     fixed, rigid = building.fixed, building.rigid_motions[:, :3]
     forces = (building.mass @ rigid)[fixed.inner]
@@ -88,6 +88,15 @@ def plot_modes(scene: BuildingScene, modes: Modes, path: str | Path | None = Non
     return figure
 
 
+def _unreduced(scene: BuildingScene, given: Mapping[str, Any]) -> BuildingScene:
+    """The scene with all modes: a reduced building no longer tells the mass of its base from the mass above."""
+    from msfp_gen.buildings.file import building_from_table
+
+    frame = {name: value for name, value in given.get("building", {}).items() if name != "highest_frequency"}
+    whole = building_from_table({**given, "building": frame}, parts={"motion": scene.motion})
+    return whole if isinstance(whole, BuildingScene) else scene
+
+
 def storey_table(given: Mapping[str, Any]) -> Table | None:
     """The storeys of a `[building]` table, as given, from the top; None where it has matrices in their place."""
     storeys = given.get("storey")
@@ -109,10 +118,11 @@ def _cell(value: Any) -> str:
 
 
 def structure(scene: BuildingScene, given: Mapping[str, Any]) -> tuple[list[Table], list[tuple[str, Figure]]]:
-    """Tables and figures, with their captions, of the superstructure. given: the `[building]` table."""
-    if not len(scene.building.frequencies):
-        return [table] if (table := storey_table(given)) else [], []
-    modes, storeys = modes_of(scene), storey_table(given)
+    """Tables and figures, with their captions, of the superstructure. given: the table of the scene."""
+    storeys, kept = storey_table(given.get("building", {})), len(scene.building.frequencies)
+    if not kept:
+        return [storeys] if storeys else [], []
+    modes = Modes(*(values[:kept] for values in modes_of(_unreduced(scene, given))))
     caption = (
         f"Shapes of the first {min(DRAWN, len(modes.frequencies))} modes on a fixed base, at the centres of mass; "
         "rotation as the motion of a corner of the plan"

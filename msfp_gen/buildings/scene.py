@@ -353,7 +353,7 @@ class BuildingScene(Printed, OtherSystem):
         """What a report shows of the superstructure; see `report.analysis.structure_of`."""
         from msfp_gen.buildings.modes import structure
 
-        return structure(self, given.get("building", {}))
+        return structure(self, given)
 
     def quantities(self) -> dict[str, Source]:
         """What tables report of a run; see `results.quantities.quantities`."""

@@ -221,7 +221,7 @@ def report(
         typer.Option(metavar="RECORD", help="A record of a suite that is not in its report; may be repeated."),
     ] = None,
     no_runs: Annotated[
-        bool, typer.Option("--no-runs", help="Make no run of a suite again: no loops, nothing on vertical motion.")
+        bool, typer.Option("--no-runs", help="Make no run of a suite again: no loops, no vertical motion, no error.")
     ] = False,
     sign: SignOption = DEFAULT,
     force: Force = False,

@@ -7,6 +7,7 @@ the runs that `repeated` makes again.
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import singledispatch
@@ -19,7 +20,7 @@ import numpy as np
 from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
-from msfp_gen.common.fields import G
+from msfp_gen.common.fields import G, Quantity, ruled_fields
 from msfp_gen.common.tables import Table
 from msfp_gen.common.version import __version__
 from msfp_gen.figures.sheet import plot_sheet
@@ -27,19 +28,30 @@ from msfp_gen.figures.style import CASE_COLOURS, COLOURS, FAINT, INK, THIN, dist
 from msfp_gen.report.compared import compared_table
 from msfp_gen.report.frames import picture, render, write_page
 from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of, terms_shown
-from msfp_gen.report.repeated import plot_loops, plot_vertical, repeat_words, repeated, vertical_table
+from msfp_gen.report.repeated import (
+    Repeated,
+    error_words,
+    finer_table,
+    plot_loops,
+    plot_vertical,
+    repeat_words,
+    repeated,
+    vertical_table,
+)
 from msfp_gen.scene.explain import DOUBTFUL, explain
 from msfp_gen.scene.file.loader import bearing_from_table, bearing_tables, parsed_sheet
 from msfp_gen.scene.plausibility import runs_of_doubts
 from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.scene_fields import Limits
 from msfp_gen.scene.sheet import Sheet
 from msfp_gen.studies.bounding import CASES, SuiteBounds, load_suite_bounds
-from msfp_gen.studies.bounding.runs import shown_as
+from msfp_gen.studies.bounding.runs import given_friction, shown_as
 from msfp_gen.studies.bounding.suite import plot_suite_bounds, suite_bound_tables, suite_doubts, suite_scenes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from msfp_gen.motions.records import ScaleTo
     from msfp_gen.studies.definition import Study
 
 PERIODS = np.geomspace(0.05, 6.0, 60)  # of the spectra [s]
@@ -114,8 +126,9 @@ def analysis_html(
     rows = read_study(folder)
     rows = rows[~rows["record"].isin(list(leave_out))]
     scene = replace(study.scene(1), name=bounds.name)
-    found = [*_sections(study, bounds, rows, scene), *(_runs_again(study, bounds, rows, progress) if loops else ())]
-    found += _last_sections(study, bounds, rows, scene)
+    runs = repeated(study, bounds, rows, progress) if loops else []
+    found = [*_sections(study, bounds, rows, scene), *_runs_again(study, bounds, runs)]
+    found += _last_sections(study, rows, scene, runs)
     sections = [part for part in found if part.tables or part.figures or part.words]
     exceeded, failed = bool(bounds.exceeded), bool(bounds.failures or bounds.stopped)
     device = ", ".join(dict.fromkeys(map(kind_of, scene.every_bearing)))
@@ -126,6 +139,7 @@ def analysis_html(
         title_block=replace(title, author="", checker="").rows(device),
         signatures=(("author", title.author), ("checker", title.checker)),
         identity=Chunks(study, Path(folder)).identity,
+        inputs=_inputs(study, bounds, scene),
         lead=_lead(bounds, rows),
         outcome=_outcome(bounds),
         verdict="failed" if failed else "exceeded" if exceeded else "within",
@@ -175,12 +189,11 @@ def _sections(study: Study, bounds: SuiteBounds, rows: Any, scene: Any) -> Itera
     yield _part_section(bounds, "Floor accelerations, drifts and storey shears", FLOORS)
     yield _spectra_section(rows)
     yield _part_section(bounds, "Displacements and axial forces of the bearings", BEARINGS, _rest(bounds))
-    yield _part_section(bounds, "Uplift", UPLIFT)
+    yield _part_section(bounds, "Uplift", UPLIFT, uplift_words(bounds))
 
 
-def _runs_again(study: Study, bounds: SuiteBounds, rows: Any, progress: Progress | None) -> Iterator[Section]:
+def _runs_again(study: Study, bounds: SuiteBounds, runs: Sequence[Repeated]) -> Iterator[Section]:
     """Loops of the runs with the largest displacements, and what the vertical component does to them."""
-    runs = repeated(study, bounds, rows, progress)
     if not runs:
         return
     caption = "Force over displacement in the runs with the largest displacement, every row of the run"
@@ -198,8 +211,10 @@ def _runs_again(study: Study, bounds: SuiteBounds, rows: Any, progress: Progress
         yield Section("Vertical component of the ground", (words,), [vertical_table(study, pairs)], figures)
 
 
-def _last_sections(study: Study, bounds: SuiteBounds, rows: Any, scene: Any) -> Iterator[Section]:
-    yield Section("Energy and numerical error", _energy(rows))
+def _last_sections(study: Study, rows: Any, scene: Any, runs: Sequence[Repeated]) -> Iterator[Section]:
+    again = next((run for run in runs if run.finer is not None), None)
+    error = [*_energy(rows, "building" in study.table["scene"]), *error_words(scene.solver, again)]
+    yield Section("Energy and numerical error", error, [finer_table(study, again)] if again else [])
     words = (
         "These comparisons are of the program, in its tests, and none is of this structure. Each page of the "
         "documentation says what was compared, and how large the differences were."
@@ -272,6 +287,50 @@ def _plot_floor_spectra(names: Sequence[str], periods: Array, values: Mapping[st
     return figure
 
 
+def _inputs(study: Study, bounds: SuiteBounds, scene: Any) -> Table:
+    """The inputs on page one; Settings has all."""
+    loads = np.array(scene.loads_at_rest) / 1e6
+    each = f", {loads.min():.3g} to {loads.max():.3g} MN on one" if len(loads) > 1 else ""
+    factors, (target, _) = study.inputs.factors[study.axes[-1].paths[0]], _target(study)
+    scales = [f"{name} × {float(study.inputs.records[name].get('scale', 1.0)):.4g}" for name in bounds.records]
+    rows = [
+        ("bearings", "; ".join(f"{n} × {kind}" for kind, n in Counter(map(kind_of, scene.every_bearing)).items())),
+        ("load at rest", f"{loads.sum():.4g} MN{f' on {len(loads)} bearings' if each else ''}{each}"),
+        *_frictions(study),
+        ("bounds", f"{factors.name}: {factors.description}".rstrip(": ")),
+        *((f"factor of {one.property.replace('_', ' ')}", "{:.4g} to {:.4g}".format(*factors.combined(one)))
+          for one in factors.factors),
+        ("ground motions and their factors", ", ".join(scales)),
+        *([("factors bring the mean to", str(target))] if target else []),
+        ("limits of the device", f"{'' if scene.limits else 'none given; by default '}{_limits(scene.limits)}"),
+        ("tolerance of a step", f"rtol = {scene.solver.rtol:g}, method {scene.solver.method}"),
+    ]  # fmt: skip
+    return Table("Main inputs; section Settings has all", (), rows)
+
+
+def _frictions(study: Study) -> Iterator[tuple[str, str]]:
+    """Friction of every kind of bearing at each bound, where it was given."""
+    cases = {case: study.scene(1 + index).every_bearing for index, case in enumerate(CASES)}
+    kinds = list(dict.fromkeys(cases["nominal"]))
+    for number, kind in enumerate(kinds, start=1):
+        at = " at the pivot" if kind.friction_given_at == "pivot" else ""
+        which = f" of type {number}" if len(kinds) > 1 else ""
+        for case, bearings in cases.items():
+            values = given_friction(bearings[cases["nominal"].index(kind)])
+            yield f"friction{at}{which}, from below, {case}", ", ".join(f"{value:.4g}" for value in values)
+
+
+def _limits(limits: Limits | None) -> str:
+    """The limits with a value of their own; the others follow from the bearing."""
+    texts = []
+    for name, rule, _ in ruled_fields(Limits):
+        value = getattr(limits or Limits(), name)
+        if isinstance(rule, Quantity) and value is not None:
+            unit, scale = shown_as(rule.unit)
+            texts.append(f"{name.replace('_', ' ')} {value * scale:.4g} {unit}")
+    return "; ".join(texts)
+
+
 def _lead(bounds: SuiteBounds, rows: Any) -> str:
     left = f", {', '.join(bounds.left_out)} left out" if bounds.left_out else ""
     count = len(bounds.records)
@@ -342,8 +401,16 @@ def _bearing_section(study: Study, scene: Any) -> Section:
     return Section("Bearing", words, tables, figures)
 
 
-def _motion_section(study: Study, bounds: SuiteBounds) -> Section:
+def _target(study: Study) -> tuple[ScaleTo | None, float | None]:
+    """To what the records are scaled, None where they have factors of their own, and the least share of it."""
     from msfp_gen.motions.records import ScaleTo
+
+    target = dict(study.table["records"].get("target") or {})
+    share = target.pop("least_share", None)
+    return ScaleTo(**target) if target else None, share
+
+
+def _motion_section(study: Study, bounds: SuiteBounds) -> Section:
     from msfp_gen.motions.records.record_tables import suite_tables
     from msfp_gen.motions.records.spectrum import MEASURES, response_spectrum
     from msfp_gen.scene.file.loader import suite_from_table
@@ -353,22 +420,22 @@ def _motion_section(study: Study, bounds: SuiteBounds) -> Section:
         for record in suite_from_table({"records": study.table["records"]["motions"]}, None).records
         if record.name in bounds.records
     ]
-    target = dict(study.table["records"].get("target") or {})
-    share = target.pop("least_share", None)
-    scale_to = ScaleTo(**target) if target else None
+    scale_to, share = _target(study)
     component = scale_to.component if scale_to else "rotd50"
     damping = scale_to.damping if scale_to else 0.05
     spectra = {record.name: response_spectrum(record.motion, PERIODS, damping=damping).psa / G for record in records}
     names, motions = [record.name for record in records], [record.motion for record in records]
-    corrections = [
+    origins = [
         (
             name,
+            str(m.metadata.get("channels", "-")),
             str(m.metadata.get("correction", "none")),
             str(m.metadata.get("file", m.metadata.get("name", "")) or "-"),
         )
         for name, m in zip(names, motions, strict=True)
     ]
-    tables = [*suite_tables(names, motions, None), Table("correction", ("record", "correction", "source"), corrections)]
+    columns = ("record", "channels", "correction", "source")
+    tables = [*suite_tables(names, motions, None), Table("channels and correction of the records", columns, origins)]
     words = [f"Spectra of {100 * damping:g} % damping. All three components of a record have one factor."]
     if scale_to:
         least = "" if share is None else f"; the mean is nowhere below {100 * share:g} % of it there"
@@ -432,7 +499,7 @@ def _part_section(bounds: SuiteBounds, title: str, quantities: Sequence[str], wo
         columns = ("part", *(f"mean {c}" for c in CASES), *(f"worst {c}" for c in CASES), "governs", "worst record")
         tables.append(Table(f"{_words_of(bounds, parts[0])} [{unit}]", columns, rows))
     if not drawn:
-        return Section(title)
+        return Section(title, words)
     caption = "Each part at each bound: mean over the records (lines) and worst record (dots)"
     return Section(title, words, tables, [(caption, _plot_parts(bounds, drawn, title))])
 
@@ -453,6 +520,7 @@ def _plot_parts(bounds: SuiteBounds, drawn: Mapping[str, Sequence[Any]], title: 
             axes.set_yticks(place, [plain(one.part) for one in parts])
             axes.set_xlabel(f"[{unit}]")
             axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
+            axes.locator_params(axis="x", nbins=4)  # numbers such as 0.0005 have room
         row[-1].legend(loc="upper left", bbox_to_anchor=(1.02, 1))
     return figure
 
@@ -469,20 +537,39 @@ def _rest(bounds: SuiteBounds) -> tuple[str, ...]:
     return tuple(f"Residual displacement: at most {1e3 * one.envelope[1]:.4g} mm, under {one.record}." for one in found)
 
 
-def _energy(rows: Any) -> list[str]:
+def uplift_words(bounds: SuiteBounds) -> tuple[str, ...]:
+    """Whether bearings lifted off, and their least axial force, in words; empty for the suite of one bearing."""
+    known = {one.name: one for one in bounds.statistics}
+    lifted = any(
+        one.envelope[1] > 0 for one in bounds.statistics if one.name.rpartition("_")[0] == "bearing_uplift_height"
+    )
+    least = known.get("minimum_load_ratio")
+    if least is None:  # one bearing: the table of limits has its uplift height
+        return ()
+    ratio = f"{least.envelope[1]:.3g} of the load at rest, under {least.record}"
+    if lifted:
+        return (f"Bearings lifted off: the least axial force was {ratio}.",)
+    until = " before it ended" if not bounds.ended.all() else ""
+    return (f"No bearing lifted off in any run{until}: the least axial force of a bearing was {ratio}.",)
+
+
+def _energy(rows: Any, building: bool) -> list[str]:
     """What the energy balances of the runs say, in words."""
     error = rows["closure_error"].dropna().abs()
     if error.empty:
         return []
     worst = rows.loc[error.idxmax()]
-    lines = [
-        f"In {len(error)} of {len(rows)} runs the work of the ground and the loads was compared with all energy "
-        "that is stored and dissipated. "
-        f"The difference is an error of the computation: at most {100 * error.max():.2g} % of the peak energy "
-        f"({worst['record']}, {worst['bounds']}), {100 * error.median():.2g} % in the median run."
+    compared, scale = (
+        ("the work of the bearings on the building was compared with its kinetic, elastic and damped energy", "largest")
+        if building
+        else ("the work of the ground and the loads was compared with all energy stored and dissipated", "peak input")
+    )
+    return [
+        f"In {len(error)} of {len(rows)} runs {compared}. The difference is an error of the computation: at most "
+        f"{100 * error.max():.2g} % of the {scale} energy ({worst['record']}, {worst['bounds']}), "
+        f"{100 * error.median():.2g} % in the median run.",
+        f"The runs took {int(rows['steps'].min())} to {int(rows['steps'].max())} time steps.",
     ]
-    lines.append(f"The runs took {int(rows['steps'].min())} to {int(rows['steps'].max())} time steps.")
-    return lines
 
 
 def _files(study: Study) -> Table:

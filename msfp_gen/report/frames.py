@@ -162,6 +162,7 @@ def packed(values: Array) -> dict[str, Any]:
 
 
 RESOLUTION = 110  # dots per inch of the figures
+TALL = 0.8  # height over width, above which a figure needs most of a page
 
 
 def render(template: str, **values: Any) -> str:
@@ -183,11 +184,12 @@ def of_texts(table: Table) -> list[bool]:
 
 
 def picture(title: str, figure: Figure) -> dict[str, str]:
-    """A figure as the templates show it: its title and its WebP data."""
+    """A figure as the templates show it: its title, its WebP data, and whether it is tall, for print."""
     drawn = BytesIO()
     # Without loss: a palette of the image's own would mix the colours of figures.style. Less than half of a PNG.
     figure.savefig(drawn, format="webp", dpi=RESOLUTION, pil_kwargs={"lossless": True})
-    return {"title": title, "webp": base64.b64encode(drawn.getvalue()).decode("ascii")}
+    shape = "tall" if figure.get_figheight() > TALL * figure.get_figwidth() else "low"
+    return {"title": title, "webp": base64.b64encode(drawn.getvalue()).decode("ascii"), "shape": shape}
 
 
 ASSETS = files(__package__) / "assets"

@@ -1,7 +1,8 @@
 """Runs of a suite made again for its report: loops of all rows, and what the vertical component of the ground does.
 
 The rows of a suite have no histories. At each bound the run with the largest displacement is made again, and once more
-without its vertical component; all quantities of the former are compared with its row.
+without its vertical component; all quantities of the former are compared with its row. One of them is made a third
+time at a smaller tolerance, for the error of the runs.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ import numpy as np
 
 from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.errors import RunError
 from msfp_gen.common.tables import Table
 from msfp_gen.figures.style import (
     COLOURS,
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from msfp_gen.scene.solver import Solver
     from msfp_gen.studies.definition import Study
 
 # Quantities that are compared with and without the vertical component, where the runs have them.
@@ -52,6 +53,8 @@ COMPARED = (
 )  # fmt: skip
 BESIDE = 4.0  # time before and after the largest base shear that is drawn [s]
 LOADED = 0.1  # of the load at rest, least sum of the axial forces to which a shear is compared
+FINER = 10.0  # by this the tolerances of one run are smaller, for the error of the runs
+MOST_STEPS = 30.0  # of this run over the steps of the run at the tolerance of the suite; about 2 to 5 are usual
 NOTHING = 1e-9  # vertical acceleration that is none [m/s^2]
 
 
@@ -59,7 +62,8 @@ NOTHING = 1e-9  # vertical acceleration that is none [m/s^2]
 class Repeated:
     """A run of a suite made again. level: the same without its vertical component; None where it has none, or failed.
 
-    difference: largest relative difference of a quantity from the row of the suite, over `compared` quantities.
+    difference: largest relative difference of a quantity from the row of the suite, over `compared` quantities. finer:
+    of one of the runs the same at tolerances divided by FINER; None of the others, or where it failed.
     """
 
     case: str
@@ -68,6 +72,7 @@ class Repeated:
     level: Any
     difference: float
     compared: int
+    finer: Any = None
 
 
 def repeated(study: Study, bounds: SuiteBounds, rows: Any, progress: Progress | None = None) -> list[Repeated]:
@@ -77,21 +82,70 @@ def repeated(study: Study, bounds: SuiteBounds, rows: Any, progress: Progress | 
         ended = rows[(rows["bounds"] == case) & (rows["status"] == "ok")]
         if len(ended):
             chosen.append(ended.loc[ended["peak_displacement"].idxmax()])
+    if not chosen:
+        return []
     scenes = [study.scene(int(row["run"])) for row in chosen]
     moved = [index for index, scene in enumerate(scenes) if has_vertical(scene.motion)]
     level = [replace(scenes[index], motion=without_vertical(scenes[index].motion)) for index in moved]
-    with closing(completed_runs([*scenes, *level], progress=progress)) as runs:
-        results = dict(runs)
-    without = {index: results[len(scenes) + place] for place, index in enumerate(moved)}
+    tight = next((index for index, row in enumerate(chosen) if row["bounds"] == "nominal"), 0)
+    tightened = scenes[tight].solver.tightened(FINER)
+    most = min(tightened.max_steps, int(MOST_STEPS * chosen[tight]["steps"]))
+    finer = replace(scenes[tight], solver=replace(tightened, max_steps=most))
+    with closing(completed_runs([*scenes, *level, finer], progress=progress)) as runs:
+        ended = {index: result for index, result in runs if getattr(result, "status", "") == "ok"}
+    without = {index: ended.get(len(scenes) + place) for place, index in enumerate(moved)}
     found = []
     for index, row in enumerate(chosen):
-        if isinstance(results[index], RunError):
-            continue
-        other = without.get(index)
-        whole = other if getattr(other, "status", "") == "ok" else None
-        difference, count = _difference(study, row, results[index])
-        found.append(Repeated(row["bounds"], row["record"], results[index], whole, difference, count))
+        if (again := ended.get(index)) is not None:
+            difference, count = _difference(study, row, again)
+            other = ended.get(len(scenes) + len(level)) if index == tight else None
+            found.append(Repeated(row["bounds"], row["record"], again, without.get(index), difference, count, other))
     return found
+
+
+def error_words(solver: Solver, run: Repeated | None) -> list[str]:
+    """What the tolerance of the runs says of the error of results, in lines. run: which was made again with `finer`."""
+    lines = [
+        f"The tolerance of the runs is rtol = {solver.rtol:g} (method {solver.method}): the error that one time step "
+        "may have. It is no error of a result, since the errors of steps add up, or decay. The page accuracy of the "
+        "documentation has the errors of results that were measured at several tolerances, on single bearings and on "
+        "buildings."
+    ]
+    if run is None:
+        return [
+            *lines,
+            "The error of the results was not measured: no run at a smaller tolerance was made for this page, or it "
+            "did not reach its end. `msfp-gen run SCENE --error 0.5%` finds the tolerance for a given error, and "
+            "states the error of its run.",
+        ]
+    return [
+        *lines,
+        f"For this page the run of {run.record} at {run.case} was made once more at rtol = {solver.rtol / FINER:g}. "
+        "The differences in the table estimate the errors of this run; the errors of the other runs, at the same "
+        "tolerance, were not measured. These are errors of the solution of the equations. They contain no error of the "
+        "model, of the properties of the bearings or of the ground motions.",
+    ]
+
+
+def finer_table(study: Study, run: Repeated) -> Table:
+    """Quantities of a run at the tolerance of all runs and at a smaller one, and their difference."""
+    rows = []
+    for name in COMPARED:
+        if (source := study.keep.known.get(name)) is None:
+            continue
+        pair = [source.value(result.entry, None) for result in (run.result, run.finer)]
+        if None in pair:
+            continue
+        unit, scale = shown_as(source.quantity.unit)
+        coarse, fine = (float(value) * scale for value in pair)
+        change = f"{100 * abs(coarse - fine) / abs(fine):.2g} %" if fine else "-"
+        words = source.words(name)
+        rows.append((f"{words} [{unit}]" if unit else words, f"{coarse:.5g}", f"{fine:.5g}", change))
+    steps = (str(result.entry("counters")["steps"]) for result in (run.result, run.finer))
+    rtol = run.result.scene.solver.rtol
+    columns = ("", f"rtol = {rtol:g}", f"rtol = {rtol / FINER:g}", "difference")
+    title = f"{run.record} at {run.case}, at the tolerance of all runs and at a smaller one"
+    return Table(title, columns, [*rows, ("time steps", *steps, "-")])
 
 
 def has_vertical(motion: Motion) -> bool:

@@ -131,10 +131,24 @@ def test_every_example_has_a_place_in_its_section(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.slow
+def test_report_of_the_hospital_page_is_complete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make_site = site_module(monkeypatch, "make_site")
+    assert make_site.REPORT in (ROOT / "docs" / "hospital.md").read_text(encoding="utf-8")
+    assert 'href="../_static/report.html"' in make_site.report(tmp_path)
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "All 6 runs reached their end" in html and str(ROOT) not in html
+    titles = re.findall(r"<h2 [^>]*>\d+\. (.*?)</h2>", html)
+    assert {"Bearing", "Superstructure", "Floor spectra", "Uplift", "Loops", "Energy and numerical error"} <= set(
+        titles
+    )
+
+
+@pytest.mark.slow
 @needs_sphinx
 def test_site_is_built_without_a_warning(tmp_path: Path) -> None:
     build(tmp_path / "site", "--no-gallery")
     check_site(tmp_path / "site")
+    assert "_static/report.html" not in (tmp_path / "site" / "docs" / "hospital.html").read_text(encoding="utf-8")
 
 
 @needs_sphinx
@@ -144,6 +158,8 @@ def test_gallery_runs_every_example_and_the_explorer(tmp_path: Path, monkeypatch
     check_site(tmp_path / "site")
     bearing = (tmp_path / "site" / "docs" / "bearing.html").read_text(encoding="utf-8")
     assert ('<iframe class="explorer"' in bearing) == (importlib.util.find_spec("ziglang") is not None)
+    hospital = (tmp_path / "site" / "docs" / "hospital.html").read_text(encoding="utf-8")
+    assert 'href="../_static/report.html"' in hospital and (tmp_path / "site" / "_static" / "report.html").is_file()
     kept = shutil.copytree(EXAMPLES, tmp_path / "kept")
     site_module(monkeypatch, "make_site").leave_out(kept)
     examples = {path.relative_to(kept).with_suffix("") for path in kept.rglob("*.py")}

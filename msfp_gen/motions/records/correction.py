@@ -11,7 +11,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite, positive
 from msfp_gen.motions.piecewise import Pieces, evaluate, from_rates
-from msfp_gen.motions.records.record import Record, sample_times
+from msfp_gen.motions.records.record import COMPONENTS, Record, sample_times
 from msfp_gen.motions.sources import product, resolving_step, smoothstep
 
 _ORDER = 4  # of the Butterworth filter
@@ -224,7 +224,7 @@ def _metadata(record: Record, start: float, done: str, displacement: Array) -> d
         "source": f"record {record.name}",
         "station": record.station,
         "record_start": record.start_time,
-        "channels": ", ".join(record.channels),
+        "channels": ", ".join(f"{e}: {c or '-'}" for e, c in zip(COMPONENTS, record.channels, strict=True)),
         "notes": "; ".join(record.notes),
         "window_start": start,
         "correction": done,

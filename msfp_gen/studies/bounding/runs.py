@@ -263,7 +263,7 @@ def _with_friction(bearing: Bearing, factors: tuple[float, ...]) -> Bearing:
     """The bearing with its coefficients multiplied where the scene gives them, at the surfaces or at the pivot."""
     # A second coefficient of a friction law takes the factor of the first, so that the law is multiplied as a whole.
     if bearing.friction_given_at == "pivot":
-        sheet = [mu * factor for mu, factor in zip(_given_friction(bearing), factors, strict=True)]
+        sheet = [mu * factor for mu, factor in zip(given_friction(bearing), factors, strict=True)]
         changed = bearing.replace(friction=sheet, friction_at="pivot")
         pairs = zip(changed.surfaces, bearing.surfaces, strict=True)
         factors = tuple(new.friction / old.friction if old.friction else 1.0 for new, old in pairs)
@@ -274,8 +274,8 @@ def _with_friction(bearing: Bearing, factors: tuple[float, ...]) -> Bearing:
     return changed
 
 
-def _given_friction(bearing: Bearing) -> tuple[float, ...]:
-    """The coefficients where they were given, bottom first [-]."""
+def given_friction(bearing: Bearing) -> tuple[float, ...]:
+    """The coefficients of friction where they were given, at the pivot or at the surfaces, bottom first [-]."""
     sheet = bearing.friction_at_pivot
     if bearing.friction_given_at == "pivot" and sheet is not None:
         return sheet
@@ -321,12 +321,12 @@ def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[
 
 def _sheet_ratios(bearing: Bearing) -> tuple[tuple[float, ...], ...]:
     """Lower, nominal and upper friction over the nominal one of every surface, where it is given. Raises InputError."""
-    given = _given_friction(bearing)
+    given = given_friction(bearing)
     cases = []
     for name, values in (("friction_lower", bearing.friction_lower), ("friction_upper", bearing.friction_upper)):
         if values is None:
             raise InputError(f"bearing.{name} is missing: give the bounds of friction, or a table of factors")
-        at = _given_friction(_with_nominal(bearing, values))
+        at = given_friction(_with_nominal(bearing, values))
         cases.append(tuple(bound / mu if mu else 1.0 for bound, mu in zip(at, given, strict=True)))
     return cases[0], (1.0,) * len(given), cases[1]
 
@@ -407,7 +407,7 @@ def _lambda_table(bounds: Bounds) -> Table:
     for name, factors in bounds.lambdas.items():
         nominal = [getattr(surface, name) for surface in bearing.surfaces]
         if name == "friction":
-            nominal = list(_given_friction(bearing))
+            nominal = list(given_friction(bearing))
         label = f"{name}{at if name == 'friction' else ''}"
         for surface, value in enumerate(nominal):
             lambdas = [factors[case][surface] for case in CASES]

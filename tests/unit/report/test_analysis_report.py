@@ -8,6 +8,7 @@ import shutil
 import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,16 @@ from msfp_gen import InputError, load_scene, simulate
 from msfp_gen.buildings.modes import modes_of
 from msfp_gen.cli import main
 from msfp_gen.report import TitleBlock, analysis_html, write_analysis
-from msfp_gen.report.analysis import _last_sections, _sections, doubt_table, limit_table
+from msfp_gen.report.analysis import (
+    _last_sections,
+    _sections,
+    doubt_table,
+    limit_table,
+    structure_of,
+    uplift_words,
+)
 from msfp_gen.report.compared import COMPARISONS, compared_table
-from msfp_gen.report.repeated import has_vertical, shear_share
+from msfp_gen.report.repeated import FINER, has_vertical, shear_share
 from msfp_gen.scene.file.source import scene_of
 from msfp_gen.studies.assessment.rows import read_study
 from msfp_gen.studies.bounding import CASES, bound_suite, load_suite_bounds, suite_study
@@ -33,7 +41,7 @@ records = [
 ]
 scale_to = { sds = "1 g", sd1 = "0.6 g", between = [1.0, 3.0], component = "rotd100" }
 """
-SHEET = {
+SHEET: dict[str, Any] = {
     "device": "triple",
     "radius": [2.2, 0.4],
     "height": [0.115, 0.055],
@@ -53,12 +61,17 @@ def building() -> dict[str, Any]:
     table = tomllib.loads((ROOT / "examples" / "building" / "building.toml").read_text(encoding="utf-8"))
     table["bearings"]["isolator"] = {"sheet": SHEET, "reference_pressure": [5.8e6, 23e6, 23e6, 5.8e6]}
     table["motion"]["duration"] = "5 s"
+    table["limits"] = {"displacement": "650 mm", "axial_load": "4 MN"}
     return table
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: Any) -> Path:
-    folder = Path(tmp_path_factory.mktemp("suite"))
+    return small_suite(Path(tmp_path_factory.mktemp("suite")))
+
+
+def small_suite(folder: Path) -> Path:
+    """The folder of the runs of a building under two records at bounds, within a folder."""
     (folder / "suite.toml").write_text(SUITE)
     (folder / "records").mkdir()  # beside the folder of the runs, as in a project
     record = ROOT / "msfp_gen" / "motions" / "records" / "files" / "ridgecrest-2019-ci-clc.v1.gz"
@@ -122,6 +135,25 @@ def test_page_one_names_inputs_author_and_checker(html: str, folder: Path) -> No
     assert "Loops" not in short and "Loops" in html
 
 
+def test_page_one_has_the_main_inputs(html: str, folder: Path) -> None:
+    """Beside the hash: bearings, their load and friction at each bound, records with their factors, tolerance."""
+    first = html[: html.index('class="contents"')]
+    assert first.index("SHA-256") < first.index("Main inputs")
+    cells = dict(re.findall(r"<tr><th[^>]*>(.*?)</th><td[^>]*>(.*?)</td></tr>", first))
+    study, _ = load_suite_bounds(folder)
+    scene: Any = study.scene(1)
+    assert cells["bearings"].startswith("4 × triple friction pendulum")
+    assert cells["load at rest"].startswith(f"{scene.weight / 1e6:.4g} MN on 4 bearings")
+    for case, key in zip(CASES, ("friction_lower", "friction", "friction_upper"), strict=True):
+        assert cells[f"friction at the pivot, from below, {case}"] == ", ".join(f"{mu:.4g}" for mu in SHEET[key])
+    scales = [study.scene(1 + len(CASES) * record).motion.metadata["scale"] for record in range(2)]
+    records = "CCC × {:.4g}, CLC &lt;b&gt; × {:.4g}".format(*map(float, scales))
+    assert cells["ground motions and their factors"] == records and scales[0] != scales[1]
+    limits = {"displacement 650 mm", "axial load 4000 kN"}
+    assert limits <= set(cells["limits of the device"].split("; "))
+    assert cells["tolerance of a step"] == f"rtol = {scene.solver.rtol:g}, method implicit"
+
+
 def test_the_report_loads_nothing_and_escapes_names(html: str, folder: Path) -> None:
     assert not re.search(r"(src|href)=\"(?!data:|#)", html) and "default-src 'none'" in html
     assert "CLC &lt;b&gt;" in html and "CLC <b>" not in html
@@ -136,7 +168,7 @@ def test_envelope_and_parts_are_those_of_the_rows(html: str, folder: Path) -> No
     assert f"storey 1 {cells}" in text
     peak = rows["peak_displacement"].to_numpy().reshape(2, 3) * 1e3
     assert "peak displacement [mm] " + " ".join(f"{v:.4g}" for v in (*peak.mean(axis=0), *peak.max(axis=0))) in text
-    assert f"at most {100 * rows['closure_error'].abs().max():.2g} % of the peak energy" in text
+    assert f"at most {100 * rows['closure_error'].abs().max():.2g} % of the largest energy" in text
 
 
 def test_shares_of_limits_are_those_of_the_runs(folder: Path) -> None:
@@ -186,6 +218,43 @@ def test_vertical_component_is_what_differs(html: str, folder: Path, largest: tu
     assert "were compared, each equal to its row" in texts(html)
 
 
+def test_error_is_the_change_at_a_tenth_of_the_tolerance(html: str, folder: Path, largest: tuple[int, Any]) -> None:
+    _, result = largest
+    finer = simulate(replace(result.scene, solver=result.scene.solver.tightened(FINER)))
+    line = next(line for line in table_rows(html, "Energy and numerical error") if "peak base shear [kN]" in line)
+    found, fine, change = re.findall(r"<td>([\d.]+)(?: %)?</td>", line)
+    values = [run.summary["peak_force"]["radial"] / 1e3 for run in (result, finer)]
+    assert [float(found), float(fine)] == pytest.approx(values, rel=6e-5)
+    assert float(change) == pytest.approx(100 * abs(values[0] - values[1]) / values[1], rel=0.06)
+    assert f"rtol = {result.scene.solver.rtol / FINER:g}" in texts(html)
+    unmeasured = texts(analysis_html(folder, loops=False))
+    assert f"rtol = {result.scene.solver.rtol:g}" in unmeasured and "was not measured" in unmeasured
+
+
+def test_uplift_is_stated_also_where_nothing_lifts(html: str, folder: Path) -> None:
+    """By the heights of the rows; and of the same rows with one bearing that lifts."""
+    _, bounds = load_suite_bounds(folder)
+    rows = read_study(folder)
+    lifted = rows.filter(regex="^bearing_uplift_height").to_numpy(dtype=float, na_value=0.0) > 0
+    least = f"{rows['minimum_load_ratio'].min():.3g} of the load at rest"
+    section = texts(html.partition(">Uplift<")[2]) if lifted.any() else texts(html)
+    (words,) = uplift_words(bounds)
+    assert escape(words) in section and least in words and words.startswith("No bearing") != lifted.any()
+    name = next(name for name in bounds.values if name.startswith("bearing_uplift_height"))
+    other = np.full_like(bounds.values[name], 0.0 if lifted.any() else 0.01)
+    every = {key: other if key.startswith("bearing_uplift") else values for key, values in bounds.values.items()}
+    (changed,) = uplift_words(replace(bounds, values=every))
+    assert changed.startswith("No bearing") == lifted.any()
+
+
+def test_channels_of_the_records_are_in_their_table(html: str, folder: Path) -> None:
+    study, _ = load_suite_bounds(folder)
+    for record, name in enumerate(("CCC", "CLC &lt;b&gt;")):
+        channels = str(study.scene(1 + len(CASES) * record).motion.metadata["channels"])
+        assert re.match(r"E1: .+, E2: .+, E3: .+", channels)
+        assert len([line for line in table_rows(html, "Ground motions") if name in line and channels in line]) == 1
+
+
 def table_rows(html: str, title: str) -> list[str]:
     """The rows of the tables of a section."""
     start = re.search(rf"<h2 [^>]*>\d+\. {title}", html)
@@ -225,6 +294,21 @@ def test_modes_are_those_of_closed_form() -> None:
     assert modes.participating[along, 0] == pytest.approx(effective / 2, rel=1e-9)
     assert modes.participating.sum(axis=0)[:2] == pytest.approx([1.0, 1.0], rel=1e-9)
     assert np.abs(modes.shapes).max(axis=(1, 2))[along] == pytest.approx([1.0, 1.0])
+
+
+def test_participating_masses_are_of_the_mass_above_the_base(html: str) -> None:
+    """All six modes of two rigid floors move their whole mass; modes beyond the highest frequency are missing only."""
+    (line,) = [line for line in table_rows(html, "Superstructure") if "sum of all" in line]
+    assert re.findall(r"<td>([\d.]+)</td>", line) == ["100.00", "100.00", "0.00"]
+    rows = []
+    for highest in ("30 Hz", "4 Hz"):
+        table = building()
+        table["building"]["highest_frequency"] = highest
+        _, modes = structure_of(scene_of(table), table)[0]
+        rows.append(modes.rows)
+    assert len(rows[0]) == 6 + 1 and len(rows[1]) == 2 + 1 and rows[0][:2] == rows[1][:2]
+    along = [float(row[3]) for row in rows[1]]
+    assert 0 < along[-1] < 100 and along[-1] == pytest.approx(sum(along[:-1]), abs=0.02)
 
 
 def test_a_record_left_out_is_not_in_the_report(folder: Path, tmp_path: Path) -> None:
