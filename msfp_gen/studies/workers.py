@@ -257,7 +257,7 @@ class Workers(Executor):
         self._began = 0.0  # when a call was submitted while there was none [s]
 
     def begin(self, ways: Ways) -> None:
-        """Begin a block of calls, of which `ways` tell something."""
+        """Begin a block of calls; `ways` has what earlier calls like them told."""
         self.ways, self._suited = ways, self._count > 1
 
     def submit(  # type: ignore[override]
