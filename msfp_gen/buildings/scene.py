@@ -127,6 +127,10 @@ class BuildingScene(Printed, OtherSystem):
     """
 
     run_options: ClassVar[frozenset[str]] = frozenset({"threads"})
+    energy_compared: ClassVar[tuple[str, str]] = (
+        "the work of the bearings on the building was compared with its kinetic, elastic and damped energy",
+        "largest",
+    )
     building: Building
     bearings: Sequence[BuildingBearing]
     motion: Motion

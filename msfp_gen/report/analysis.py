@@ -213,7 +213,7 @@ def _runs_again(study: Study, bounds: SuiteBounds, runs: Sequence[Repeated]) -> 
 
 def _last_sections(study: Study, rows: Any, scene: Any, runs: Sequence[Repeated]) -> Iterator[Section]:
     again = next((run for run in runs if run.finer is not None), None)
-    error = [*_energy(rows, "building" in study.table["scene"]), *error_words(scene.solver, again)]
+    error = [*_energy(rows, *scene.energy_compared), *error_words(scene.solver, again)]
     yield Section("Energy and numerical error", error, [finer_table(study, again)] if again else [])
     words = (
         "These comparisons are of the program, in its tests, and none is of this structure. Each page of the "
@@ -553,17 +553,12 @@ def uplift_words(bounds: SuiteBounds) -> tuple[str, ...]:
     return (f"No bearing lifted off in any run{until}: the least axial force of a bearing was {ratio}.",)
 
 
-def _energy(rows: Any, building: bool) -> list[str]:
-    """What the energy balances of the runs say, in words."""
+def _energy(rows: Any, compared: str, scale: str) -> list[str]:
+    """What the energy balances of the runs say, in words. compared, scale: as in `System.energy_compared`."""
     error = rows["closure_error"].dropna().abs()
     if error.empty:
         return []
     worst = rows.loc[error.idxmax()]
-    compared, scale = (
-        ("the work of the bearings on the building was compared with its kinetic, elastic and damped energy", "largest")
-        if building
-        else ("the work of the ground and the loads was compared with all energy stored and dissipated", "peak input")
-    )
     return [
         f"In {len(error)} of {len(rows)} runs {compared}. The difference is an error of the computation: at most "
         f"{100 * error.max():.2g} % of the {scale} energy ({worst['record']}, {worst['bounds']}), "

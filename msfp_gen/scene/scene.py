@@ -23,6 +23,7 @@ from msfp_gen.scene.planarity import along, scene_plane
 from msfp_gen.scene.scene_fields import InitialState, Limits, SceneFields, Stop
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_seats, check_standing, standing_of
+from msfp_gen.scene.system import ENERGY_COMPARED
 from msfp_gen.scene.top import NodeTop, Top
 from msfp_gen.specification import contract
 from msfp_gen.specification.friction_laws import LONGEST, Law
@@ -60,6 +61,7 @@ class Scene(Printed, SceneFields):
 
     run_options: ClassVar[frozenset[str]] = frozenset({"strict", "gradients", "energy_gradients", "gradient_errors"})
     rows_between_steps: ClassVar[bool] = True
+    energy_compared: ClassVar[tuple[str, str]] = ENERGY_COMPARED
     own_motions: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:

@@ -25,6 +25,11 @@ if TYPE_CHECKING:
     from msfp_gen.specification.friction_laws import Law
     from msfp_gen.specification.layout import Effects, ModelSpec
 
+# What an energy balance compares, and the energy to which its difference is relative, in words for reports.
+ENERGY_COMPARED = (
+    "the work of the ground and the loads was compared with all energy stored and dissipated",
+    "peak input",
+)
 GROUP = "msfp_gen.systems"  # of entry points; the name of each is the `key` of its kind
 
 
@@ -104,6 +109,10 @@ class System(Protocol):
         """Paths of the motions of single bearings, which `motion` does not move."""
 
     @property
+    def energy_compared(self) -> tuple[str, str]:
+        """What the energy balance of a run compares, and to what its difference is relative, in words."""
+
+    @property
     def loads_at_rest(self) -> tuple[float, ...]:
         """Axial load of every bearing at rest [N]."""
 
@@ -125,6 +134,7 @@ class OtherSystem(ABC):
 
     run_options: ClassVar[frozenset[str]] = frozenset()
     rows_between_steps: ClassVar[bool] = False
+    energy_compared: ClassVar[tuple[str, str]] = ENERGY_COMPARED
     longest_row_step: ClassVar[tuple[float, str]] = (math.inf, "")  # rows of other systems are few
     own_motions: Any = ()  # a property of buildings
     name: Any

@@ -51,7 +51,7 @@ def test_page_says_what_the_template_says():
 def test_bounds_are_ten_times_what_the_references_are_known_to():
     """Of every table of methods: the bound, and by how much the two references differ RMS in force and sliding."""
     found = re.findall(
-        r"Within ([\d.]+) %:.*?differ by (\S+) RMS and \S+ at most in force, (\S+) and", WRITTEN, re.DOTALL
+        r"Within ([\d.]+) %:.*?differ by (\S+) RMS and \S+ at most in force, (\S+) RMS and", WRITTEN, re.DOTALL
     )
     assert len(found) == len(page.ALL_CASES)
     for bound, *floors in found:

@@ -47,6 +47,7 @@ ELSEWHERE = {
     "motions/records/text.py": "tests/unit/motions/records/test_record_fuzz.py",
     "studies/assessment/rows.py": "tests/unit/studies/test_study_runs.py",
     "studies/estimation/source.py": "tests/unit/studies/test_estimate.py",
+    "cli/sheet_commands.py": "tests/unit/design/test_equivalent.py",
     "jit/cache.py": "tests/unit/jit/test_cache_safety.py",
     "motions/records/peer.py": "tests/unit/motions/records/test_record_fuzz.py",
 }

@@ -120,7 +120,7 @@ def test_doubtful_values_of_all_runs_are_in_the_first_section(folder: Path) -> N
     scene, rows_of_runs = replace(made.scene(1), name="x"), read_study(folder)
     first = next(_sections(made, bounds, rows_of_runs, scene))
     assert first.tables[0] == table_of_doubts and len(first.tables) > 2
-    *_, settings = _last_sections(made, bounds, rows_of_runs, scene)
+    *_, settings = _last_sections(made, rows_of_runs, scene, [])
     assert len(settings.tables) > 5 and not any("hardly meant" in one.title for one in settings.tables)
 
 
