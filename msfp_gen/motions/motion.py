@@ -35,7 +35,7 @@ _BUILDERS = {"displacement": "from_arrays", "velocity": "from_velocity", "accele
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Motion(piecewise.Travelling):
+class Motion(piecewise.PickledByFields):
     """Motion of the ground and of the base, twice continuously differentiable except at declared `jumps`.
 
     Attributes:

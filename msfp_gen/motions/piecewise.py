@@ -35,7 +35,7 @@ class Pieces(NamedTuple):
     metadata: Metadata
 
 
-class Travelling:
+class PickledByFields:
     """A frozen dataclass that is copied and pickled with its checked fields, and with its `resolution` once known."""
 
     def __getstate__(self) -> dict[str, Any]:

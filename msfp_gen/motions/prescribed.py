@@ -20,7 +20,7 @@ from msfp_gen.motions.time_grid import Resolution
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Prescribed(piecewise.Travelling):
+class Prescribed(piecewise.PickledByFields):
     """Piecewise polynomials in time; after their end the channels keep the last value.
 
     Attributes:
