@@ -196,7 +196,7 @@ in MuJoCo and by pressure fields over meshes in Drake, but both make contact and
 bearing states, so that they converge to the motion of another model.
 
 In `becker-eight-125` and `fenz-test5` nothing damps the ringing of the sliders, which the references resolve and runs at
-loose tolerances leave out: their error stays at 0.6 and 0.2 % of the peak until it is resolved. The element of OpenSees has
+loose tolerances leave out: their error stays the same until it is resolved. The element of OpenSees has
 sliders without mass, which do not ring.
 
 """
