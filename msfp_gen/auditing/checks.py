@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.momentum import Momentum, momentum
@@ -26,7 +25,6 @@ FLOOR = 0.03  # of radius, friction and mass: compliance, weights of sliders, ar
 BOUND_FLOOR = 0.05  # of the bound of friction: it is a single row, not a mean
 COUPLING_FLOOR, HEAT_FLOOR = 0.15, 0.25  # of the parts that follow the axial force, and the temperature
 DAMPING_FLOOR = 0.05  # force along the velocity over friction
-PLATE = 3.0  # weights of the top plate with which it may hang on its support while the bearing is open
 NO_TENSION = 1e-3  # tension over the load at rest that a stiff contact may have
 LEAST_VERTICAL = 0.005  # vertical acceleration over gravity from which on a mass follows from it
 COARSE = 0.02  # error of the work of friction by the rows
@@ -380,13 +378,6 @@ def vertical_mass(case: AuditCase) -> Answer:
     return Answer(CONSISTENT if close else INCONSISTENT, text, found.mass, "kg", None if close else found.time, drawing)
 
 
-def tensile(data: Histories, stated: Stated) -> NDArray[np.bool_]:
-    """Rows in which surfaces pull, (T,): more than a stiff contact may, and the top plate of an open bearing hangs."""
-    plate = stated.bearing.bodies[-1].mass * stated.bearing.gravity
-    found: NDArray[np.bool_] = data.axial < -(NO_TENSION * data.at_rest + PLATE * plate)
-    return found
-
-
 def tension(case: AuditCase) -> Answer:
     """Tension of the bearing."""
     if lack := case.lacks("axial"):
@@ -395,8 +386,7 @@ def tension(case: AuditCase) -> Answer:
     row = int(data.axial.argmin())
     least = float(data.axial[row])
     drawing = _course("axial force", data.time, data.axial / 1e3, "axial force, compression positive [kN]", row)
-    rows = tensile(data, case.stated)
-    if not rows.any():
+    if least >= -NO_TENSION * data.at_rest:
         return Answer(
             CONSISTENT,
             f"the least axial force is a compression of {_si(abs(max(least, 0.0)), 'N')}",
@@ -405,6 +395,7 @@ def tension(case: AuditCase) -> Answer:
             float(data.time[row]),
             drawing,
         )
+    rows = data.axial < -NO_TENSION * data.at_rest
     span = float((np.gradient(data.time) * rows).sum())
     text = (
         f"the bearing pulls with up to {_si(-least, 'N')}, in tension for {span:.3g} s in all; its "

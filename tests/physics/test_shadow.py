@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.audits import run_of, shaken, tensile, uncoupled, with_columns, with_force
 
-from msfp_gen import InputError, audit, load_scene, shadow, simulate
+from msfp_gen import InputError, load_scene, shadow, simulate
 from msfp_gen.auditing.histories import histories_of
 from msfp_gen.auditing.shadow import _variants
 from msfp_gen.results.sliding import merged, open_times
@@ -117,7 +117,6 @@ def test_a_result_with_lift_off_has_a_shadow_that_lifts_off():
     result = simulate(scene)
     found = shadow(result, scene)
     assert found.difference < 0.01 and found.missing == ()
-    assert "tension" not in [finding.check for finding in audit(result, scene).inconsistent], "the top plate hangs"
     own = merged(spell for surface in open_times(result.history, result.events) for spell in surface)
     long = [(start, length) for start, length in own if length > 0.02]
     seen = [any(a < start + length and start < a + b for a, b in found.openings) for start, length in long]
