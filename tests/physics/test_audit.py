@@ -231,5 +231,6 @@ def test_sound_results_of_opensees(name, at):
     friction = [surface.friction for surface in scene.bearing.surfaces]
     found = audit(data, scene.bearing.replace(friction=friction, friction_at=at))
     assert not found.inconsistent, found.text
-    if at == "pivot" and found.finding("friction").verdict == "consistent":
+    if at == "pivot" and name in ("fenz-test3", "fenz-test4", "fenz-test5", "becker-eight-88"):  # outermost ones slide
+        assert found.finding("friction").verdict == "consistent"
         assert found.finding("friction").value == pytest.approx(1.0, abs=0.05)
