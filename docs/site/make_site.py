@@ -27,6 +27,7 @@ FILES = ("LICENSE", "CITATION.cff", "examples", "docs/figures", "benchmarks/isol
 SOURCES = r"\]\(\.\./((?:generator|msfp_gen)/[^)#]+)\)"  # links of pages to the code
 EXPLORER = "<!-- explorer -->\n"  # where it stands on the page of the bearing
 REPORT = "<!-- report -->\n"  # where the page of the hospital leads to a report
+DIAGRAM = r"```mermaid\nflowchart TB\n([^`]*)```\n"
 EXAMPLES = r"\]\(((?:\.\./)?)examples(?:/gallery/(\w+/\w+)\.py)?\)"  # links to the examples, or to one of the gallery
 
 
@@ -84,11 +85,22 @@ def collect(source: Path, *, gallery: bool) -> None:
     page = source / "docs" / "hospital.md"
     text = page.read_text(encoding="utf-8")
     page.write_text(text.replace(REPORT, report(source / "_static") if gallery else ""), encoding="utf-8")
+    page = source / "docs" / "architecture.md"
+    page.write_text(re.sub(DIAGRAM, arrows, page.read_text(encoding="utf-8")), encoding="utf-8")
     (source / "cli.md").write_text(command_page(), encoding="utf-8")
     for name in () if gallery else ("start.md", "buildings.md"):
         page = source / name
         lines = [line for line in page.read_text(encoding="utf-8").splitlines() if "gallery/" not in line]
         page.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def arrows(diagram: re.Match[str]) -> str:
+    """A diagram as a table, since drawing it needs a script from the network."""
+    rows = ["| from | arrow | to |", "|---|---|---|"]
+    for line in diagram[1].splitlines():
+        begin, arrow, ends = re.fullmatch(r'\s*(\w+) -(?:->|\. (\w+) \.->) (.+?)(?:\["[^]]*)?\]?', line).groups()
+        rows.append(f"| `{begin}` | {arrow or 'imports'} | {', '.join(f'`{end}`' for end in ends.split(' & '))} |")
+    return "\n".join(rows) + "\n"
 
 
 def explorer(page: str, folder: Path) -> str:
@@ -127,7 +139,8 @@ def program(*words: object) -> None:
 
 def command_page() -> str:
     """Help texts of all commands."""
-    parts = ["# Commands\n\nThe help text of every command, as `msfp-gen COMMAND --help` prints it.\n"]
+    who = "For everyone who works in a terminal: the help of every command, as `msfp-gen COMMAND --help` prints it."
+    parts = [f"# Commands\n\n{who}\n"]
     listing = help_of()
     names = [line.split()[0] for line in listing.partition("Commands:\n")[2].partition("\n\n")[0].splitlines()
              if line.startswith("  ") and line[2] != " "]  # fmt: skip
@@ -138,8 +151,8 @@ def command_page() -> str:
 
 
 def help_of(*command: str) -> str:
-    """Help text of a command, 100 columns wide."""
-    environment = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1"}
+    """Help text of a command, 120 columns wide."""
+    environment = {**os.environ, "COLUMNS": "120", "NO_COLOR": "1"}
     run = [sys.executable, "-m", "msfp_gen", *command, "--help"]
     return subprocess.run(run, cwd=ROOT, env=environment, text=True, capture_output=True, check=True).stdout
 

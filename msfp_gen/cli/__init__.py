@@ -32,6 +32,7 @@ app = typer.Typer(
     "  msfp-gen demo -o out\n  msfp-gen run fenz-test2 --plot loops.png\n  msfp-gen generate 7 3 3",
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
+    context_settings={"max_content_width": 120},
 )
 # This order is the order of the commands in the help text.
 for group in (
