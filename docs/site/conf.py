@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from docutils import nodes
 from latex2mathml.converter import convert
-from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
-from sphinx.highlighting import lexers
 
 from msfp_gen.common.version import __version__
 
@@ -20,8 +18,10 @@ author = "The msfp-gen developers"
 copyright = author
 version = release = __version__
 
-sys.path.insert(0, str(Path(__file__).parent))  # gallery_settings, excerpts, terms
+sys.path.insert(0, str(Path(__file__).parent))  # gallery_settings and the modules below
 import excerpts  # noqa: E402
+import interface  # noqa: E402
+import shapes  # noqa: E402
 import terms  # noqa: E402
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
@@ -39,7 +39,12 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"msfp-gen {release}"
 html_show_sourcelink = False
 html_copy_source = False
-html_sidebars = {"**": ["sidebar-collapse", "sidebar-nav-bs", "page-toc"], "index": [], "search": []}
+html_sidebars = {
+    "**": ["sidebar-collapse", "sidebar-nav-bs", "page-toc"],
+    "cli": ["page-toc"],
+    "index": [],
+    "search": [],
+}
 html_theme_options: dict[str, Any] = {
     "navigation_with_keys": False,
     "show_nav_level": 1,
@@ -53,11 +58,11 @@ html_theme_options: dict[str, Any] = {
 
 myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 4
-lexers["mermaid"] = TextLexer()  # diagrams are shown as their source: drawing them needs a script from the network
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_format = "short"
+autodoc_type_aliases = interface.ALIASES
 autodoc_class_signature = "mixed"
 napoleon_use_rtype = False
 napoleon_use_ivar = True
@@ -88,13 +93,17 @@ sphinx_gallery_conf = {
 }
 
 
+def _mathml(formula: str, display: Literal["inline", "block"]) -> str:
+    return convert(formula.replace("{aligned}", "{align*}"), display=display)  # the converter knows the second alone
+
+
 def _inline(writer: Any, node: nodes.math) -> None:
-    writer.body.append(convert(node.astext()))
+    writer.body.append(_mathml(node.astext(), "inline"))
     raise nodes.SkipNode
 
 
 def _block(writer: Any, node: nodes.math_block) -> None:
-    writer.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>\n')
+    writer.body.append(f'<div class="math">{_mathml(node.astext(), "block")}</div>\n')
     raise nodes.SkipNode
 
 
@@ -102,6 +111,8 @@ def setup(app: Sphinx) -> None:
     """Formulas become MathML, which browsers draw without a script; the search shows excerpts without a server."""
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
     app.add_transform(terms.Entries)
+    interface.setup(app)
+    shapes.setup(app)
     app.connect("html-page-context", excerpts.only_on_search)
     app.connect("build-finished", excerpts.write)
 
