@@ -112,7 +112,8 @@ def _block(writer: Any, node: nodes.math_block) -> None:
 TYPES = {
     r"~numpy[\w.]*\._Buffer \| .*?_NestedSequence\[complex \| bytes \| str\]": "array_like",
     r"~numpy\.ndarray\[~?tuple\[~typing\.Any, \.\.\.\], ~numpy\.dtype\[~numpy\.\w+\]\]": "ndarray",
-    r"~typ(?:es|ing)\.Annotated\[((?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])+?), ~?[\w.]+\((?:[^()]|\([^()]*\))*\)\]": r"\1",
+    r"~typ(?:es|ing)\.Annotated"
+    r"\[((?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])+?), ~?[\w.]+\((?:[^()]|\([^()]*\))*\)\]": r"\1",
 }
 
 
