@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any, Literal
@@ -94,7 +95,13 @@ sphinx_gallery_conf = {
 
 
 def _mathml(formula: str, display: Literal["inline", "block"]) -> str:
-    return convert(formula.replace("{aligned}", "{align*}"), display=display)  # the converter knows the second alone
+    """MathML of LaTeX; ValueError where a command or an alignment would stand in it as text."""
+    found = convert(
+        formula.replace("{aligned}", "{align*}").replace(r"\operatorname{atan2}", r"\text{atan2}"), display=display
+    )
+    if re.search(r"<m\w+>(&(?!#)|\\)", found):
+        raise ValueError(f"latex2mathml does not know all of {formula}")
+    return found
 
 
 def _inline(writer: Any, node: nodes.math) -> None:

@@ -13,12 +13,12 @@ from sphinx.application import Sphinx
 
 import msfp_gen
 
-ALIASES = {"Array": "ndarray", "ArrayLike": "ArrayLike"}  # shown by these names, not by what they stand for
+ALIASES = {"Array": "ndarray", "ArrayLike": "array_like"}  # shown by these names, not by what they stand for
 _RULE = re.compile(r"~?(?:typing\.|types\.)?Annotated\[(.*), [~\w.]+\((.*)\)\]", re.DOTALL)
 _UNIT = re.compile(r"unit=(.*?), above=")
 _NAMES = re.compile(r"(ivar|vartype) ([^\s,]+(?:, [^\s,]+)+)")
 _SHORTER = (
-    (r"[~.\w]*_Buffer \| .*?_NestedSequence\[complex \| bytes \| str\]", "ArrayLike"),  # in a union: no alias there
+    (r"[~.\w]*_Buffer \| .*?_NestedSequence\[complex \| bytes \| str\]", "array_like"),  # in a union: no alias there
     (r"~?(?:numpy\.)?ndarray\[tuple\[\S*Any, \.\.\.\], \S*float64\]\]", "ndarray"),
     (r"TypeAliasForwardRef\('(\w+)'\)", r"\1"),
     (r"dataclasses\.InitVar\[(.*)\]", r"\1"),
