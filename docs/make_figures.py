@@ -94,7 +94,7 @@ def draw_layouts(folder: Path) -> None:
                 axes.text(0, style.MILLI * middle.mean(), str(number), ha="center", va="center", fontsize=8)
             layout = given.bearing.layout
             axes.set_title(f"{title}: ({layout.n}, {layout.m}, {layout.p})", fontsize=10)
-            axes.set_aspect("equal")
+            axes.set_aspect("equal", anchor="N")
             axes.margins(0.12)
             axes.set_axis_off()
 

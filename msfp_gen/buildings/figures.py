@@ -41,6 +41,7 @@ ORBIT = 0.42  # radius of the largest orbit in the plan, over the least distance
 ROUND = (1, 2, 5)  # magnifications are these times a power of ten
 LABELLED = 24  # bearings of a plan that are labelled, at most
 AXES = range(3)
+ROOM_ABOVE = 0.2  # for a legend above curves, over their height
 
 
 def plot_plan(result: BuildingResult, path: str | Path | None = None) -> Figure:
@@ -216,7 +217,14 @@ def draw_axial_history(axes: Axes, result: BuildingResult) -> None:
     axes.axhline(0.0, color=INK, linewidth=THIN)
     axes.set(title="Axial force over that at rest", xlabel="time t [s]", ylabel="N / N at rest [-]")
     axes.margins(x=0.01)
-    axes.legend(loc="upper right", ncols=2)
+    legend_above(axes, 2)
+
+
+def legend_above(axes: Axes, columns: int) -> None:
+    """A legend in room above the curves, which fill their panel."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + ROOM_ABOVE * (high - low))
+    axes.legend(loc="upper right", ncols=columns)
 
 
 def draw_axial_ranges(axes: Axes, result: BuildingResult) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.buildings.figures import MovingFrame, draw_axial_history, magnification, plan_of, title_of
+from msfp_gen.buildings.figures import MovingFrame, draw_axial_history, legend_above, magnification, plan_of, title_of
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures.movie import TALLEST, WIDE, Film, Layout, even
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 BELOW_FRAME = 3.2  # height of plan, loops and axial forces [inch]
-AROUND_FRAME = 1.6  # height of title, legend and labels of the elevations [inch]
+AROUND_FRAME = 1.4  # height of title, legend and labels of the elevations [inch]
 ROOM = 0.03  # around the frame in an elevation, over its width
 PLATE = 0.022  # half width of a bearing in an elevation, over the width of the frame
 STILL = 0.01  # largest displacement along an axis that is not drawn as a loop, over the other
@@ -169,7 +169,7 @@ def _draw_loops(axes: Axes, result: BuildingResult, time: Array) -> Layout:
         xlabel=f"mean u = {shown_sign().difference} [mm]",
         ylabel="base shear / weight [-]",
     )
-    axes.legend(loc="best")
+    legend_above(axes, 2)
     places = [[np.interp(time, result.time, path) for path in _mean_loop(result, axis)] for axis in moving]
 
     def move(row: int) -> None:
@@ -189,7 +189,6 @@ def _mean_loop(result: BuildingResult, axis: int) -> tuple[Array, Array]:
 def _draw_forces(axes: Axes, result: BuildingResult, time: Array) -> Layout:
     """Axial forces of the bearings over time, and the instant of the frame."""
     draw_axial_history(axes, result)
-    axes.legend(loc="upper right", ncols=1)
     axes.set_xlim(time[0], time[-1])
     cursor = axes.axvline(time[0], color=INK, linewidth=THIN)
 

@@ -73,7 +73,7 @@ def plot_section(
     then = result.at_times(peak_time(result) if time is None else time)
     (section,) = sections(then, azimuth)
     (left, right), (low, high) = limits([section])
-    tall = 7.6 if friction_circles else 1.9 + WIDTH * (high - low) / (right - left)
+    tall = 7.6 if friction_circles else 1.3 + WIDTH * (high - low) / (right - left)
     with page(5.6 if friction_circles else WIDTH + 1.2, tall, path) as figure:
         headline(figure, label_of(result))
         axes = figure.subplots()

@@ -32,4 +32,4 @@ print(f"effective stiffness {loop.effective_stiffness / 1e6:.2f} kN/mm, damping 
 # The stack at its largest displacement, to scale.
 
 figure = plot_section(result)
-figure.set_size_inches(6.0, 4.2)
+figure.set_size_inches(6.0, 3.4)

@@ -19,8 +19,10 @@ found = bound(scene, load_factors("asce7"))
 # Which case governs which demand. A rim that is met has no capacity left.
 
 values, governing = found.quantities(), found.governing()
-for name in ("peak_displacement", "peak_force", "capacity_left_1"):
-    print(f"{name:18}", {case: float(f"{value:.3g}") for case, value in values[name].items()}, governing[name])
+for name, unit in (("peak_displacement", "mm"), ("peak_force", "kN"), ("capacity_left_1", "mm")):
+    factor = 1e3 if unit == "mm" else 1e-3
+    cases = ", ".join(f"{case} {factor * value:.3g}" for case, value in values[name].items())
+    print(f"{name} [{unit}]: {cases}; {governing[name]} governs")
 
 # %%
 # The distance of the top plate from the centre.
