@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import run_tutorial
 
-from msfp_gen import figures, load_scene, simulate, study
+from msfp_gen import figures, load_scene, simulate, study, write_report
 from msfp_gen.cli.run_commands import DEMO, DEMO_METHODS, DEMO_TOLERANCES
 from msfp_gen.figures import style
 from msfp_gen.motions.records import baseline_corrected, bundled, response_spectrum
@@ -25,7 +25,10 @@ from msfp_gen.studies import fragility, ida, plot_fragility, plot_ida, read_stud
 from msfp_gen.studies.accuracy.study import draw_summary, work_precision
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
-from quick import docs_folder, parser, pick
+from quick import docs_folder, installed, parser, pick
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from tests.support.explorer_page import CHROMIUM, DRIVER, FLAGS
 
 FOLDER = Path(__file__).resolve().parent / "figures"
 EXAMPLES = FOLDER.parents[1] / "examples"
@@ -129,6 +132,28 @@ def draw_tutorial(folder: Path) -> None:
             shutil.copy(Path(name) / picture, folder)
 
 
+def draw_report(folder: Path) -> None:
+    """The bearing in motion in the report of test 5, as Chromium shows it."""
+    if not (CHROMIUM and DRIVER and installed("selenium", "all")):
+        print("report-page.png is left out: this needs selenium, Chromium and its driver")
+        return
+    from selenium.webdriver import Chrome, ChromeOptions, ChromeService
+
+    with TemporaryDirectory() as name:
+        page = write_report(run("fenz-test5"), Path(name) / "report.html")
+        options = ChromeOptions()
+        options.binary_location = CHROMIUM
+        for flag in (*FLAGS, "--window-size=1400,1400", f"--user-data-dir={name}/profile"):
+            options.add_argument(flag)
+        browser = Chrome(options=options, service=ChromeService(DRIVER))
+        try:
+            browser.get(page.as_uri())
+            browser.execute_async_script("setTimeout(arguments[0], 1000)")  # until the view is drawn
+            browser.find_element("css selector", ".stage").screenshot(str(folder / "report-page.png"))
+        finally:
+            browser.quit()
+
+
 def draw_record(folder: Path) -> None:
     """A record before and after correction, and its response spectra."""
     raw = bundled(RECORD)
@@ -187,6 +212,7 @@ def main(folder: Path = FOLDER) -> None:
     draw_tutorial(folder)
     draw_hospital(folder)
     draw_hospital_design(folder)
+    draw_report(folder)
     draw_record(folder)
     draw_cost(folder)
     draw_demo(folder)
