@@ -2,7 +2,7 @@
 =========================
 
 For whoever has a method to try: the implicit midpoint rule in ten lines, on the right-hand side and the exact Jacobian
-of a double pendulum below a mass. The error falls to a quarter where the step is halved.
+of a double pendulum below a mass. A step of half the length divides the error by four on average.
 """
 
 import matplotlib.pyplot as plt
@@ -44,7 +44,7 @@ for step, error in zip(steps, errors, strict=True):
     print(f"step {1e3 * step:.1f} ms: error of the angles {error:.1e} rad")
 
 # %%
-# The errors are of second order in the step.
+# The errors are of second order in the step: halving it three times divides them by 57, nearly 4 x 4 x 4.
 
 figure, axes = plt.subplots()
 axes.loglog(1e3 * steps, errors, "o-", markersize=9, label="midpoint rule")
