@@ -54,8 +54,12 @@ def shorten(app: Sphinx, domain: str, kind: str, content: Element) -> None:
         for node in signatures[1:]:
             content.parent.remove(node)
     for node in signatures[0].findall(addnodes.desc_annotation):
-        if "TypeAliasForwardRef" in node.astext():
-            node[:] = [nodes.Text(type_text(node.astext()))]
+        if "TypeAliasForwardRef" in node.astext():  # an alias inside a generic type is a call with its name
+            node[:] = [
+                nodes.Text(part.astext().strip("'")) if part.astext().startswith("'") else part
+                for part in node
+                if part.astext() not in "()" and not part.astext().startswith("TypeAliasForwardRef")
+            ]
     hints: dict[str, str]
     for hints in app.env.current_document.autodoc_annotations.values():
         for name, annotation in list(hints.items()):

@@ -93,9 +93,15 @@ def check_site(folder: Path) -> None:
     assert "msfp-gen explain" in (folder / "cli.html").read_text(encoding="utf-8")
     model = (folder / "docs" / "model.html").read_text(encoding="utf-8")
     assert "On this page" in model, "a long page lists its sections"
-    assert "<math" in model and "$" not in re.sub(
-        r"<(code|pre).*?</\1>", "", model.partition("<article")[2].partition("</article")[0], flags=re.DOTALL
-    )
+    assert "<math" in model
+    for path in pages:
+        article = path.read_text(encoding="utf-8").partition("<article")[2].partition("</article")[0]
+        assert "$" not in re.sub(r"<(code|pre).*?</\1>", "", article, flags=re.DOTALL), f"{path.name}: a raw formula"
+        assert "flowchart TB" not in article, f"{path.name}: a raw diagram"
+        if path.parent.name == "api":
+            assert not re.search(r"Annotated|_NestedSequence|ForwardRef|&lt;lambda", article), (
+                f"{path.name}: a raw type"
+            )
 
 
 def build(folder: Path, *options: str) -> None:
