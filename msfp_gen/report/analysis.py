@@ -46,7 +46,13 @@ from msfp_gen.scene.scene_fields import Limits
 from msfp_gen.scene.sheet import Sheet
 from msfp_gen.studies.bounding import CASES, SuiteBounds, load_suite_bounds
 from msfp_gen.studies.bounding.runs import given_friction, shown_as
-from msfp_gen.studies.bounding.suite import plot_suite_bounds, suite_bound_tables, suite_doubts, suite_scenes
+from msfp_gen.studies.bounding.suite import (
+    plot_suite_bounds,
+    suite_bound_tables,
+    suite_doubts,
+    suite_scenes,
+    uplift_words,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -535,22 +541,6 @@ def _rest(bounds: SuiteBounds) -> tuple[str, ...]:
         return ("No residual displacement is stated: some runs end while the structure still moves.",)
     found = [one for one in bounds.statistics if one.name == "residual_displacement"]
     return tuple(f"Residual displacement: at most {1e3 * one.envelope[1]:.4g} mm, under {one.record}." for one in found)
-
-
-def uplift_words(bounds: SuiteBounds) -> tuple[str, ...]:
-    """Whether bearings lifted off, and their least axial force, in words; empty for the suite of one bearing."""
-    known = {one.name: one for one in bounds.statistics}
-    lifted = any(
-        one.envelope[1] > 0 for one in bounds.statistics if one.name.rpartition("_")[0] == "bearing_uplift_height"
-    )
-    least = known.get("minimum_load_ratio")
-    if least is None:  # one bearing: the table of limits has its uplift height
-        return ()
-    ratio = f"{least.envelope[1]:.3g} of the load at rest, under {least.record}"
-    if lifted:
-        return (f"Bearings lifted off: the least axial force was {ratio}.",)
-    until = " before it ended" if not bounds.ended.all() else ""
-    return (f"No bearing lifted off in any run{until}: the least axial force of a bearing was {ratio}.",)
 
 
 def _energy(rows: Any, compared: str, scale: str) -> list[str]:

@@ -394,6 +394,33 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
     return [table for table in tables if table.rows]
 
 
+def uplift_words(bounds: SuiteBounds) -> tuple[str, ...]:
+    """Whether bearings lifted off, and how far their force fell, in words; empty where this is not known."""
+    known = {one.name: one for one in bounds.statistics}
+    least = known.get("minimum_load_ratio")
+    if least is None:
+        return ()
+    fell = f"{least.envelope[1]:.3g} of the load at rest, under {least.record}"
+    until = " before it ended" if not bounds.ended.all() else ""
+    if "maximum_uplift" in bounds.sources:  # of one bearing
+        return _opening_words(bounds, f"the least normal force of a surface was {fell}", until)
+    if any(one.envelope[1] > 0 for one in bounds.statistics if one.name.rpartition("_")[0] == "bearing_uplift_height"):
+        return (f"Bearings lifted off: the least axial force was {fell}.",)
+    return (f"No bearing lifted off in any run{until}: the least axial force of a bearing was {fell}.",)
+
+
+def _opening_words(bounds: SuiteBounds, fell: str, until: str) -> tuple[str, ...]:
+    """The same for one bearing. fell: how far its normal force fell, in words. until: " before it ended", or ""."""
+    heights = bounds.values["maximum_uplift"]
+    simulated, runs = int((~np.isnan(heights)).sum()), heights.size
+    if not simulated:
+        return (f"No run simulated uplift, which begins where a normal force falls to zero: {fell}.",)
+    where = "every run" if simulated == runs else f"{simulated} of {runs} runs"
+    opened = float(np.nanmax(heights))
+    what = f"The bearing opened, by at most {1e3 * opened:.3g} mm" if opened else f"The bearing opened in no run{until}"
+    return (f"{what}: {fell}. Uplift was simulated in {where}.",)
+
+
 def _counted(bounds: SuiteBounds) -> str:
     count = len(bounds.records)
     return f"{count} record{'s' * (count > 1)}"

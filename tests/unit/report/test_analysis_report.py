@@ -26,13 +26,13 @@ from msfp_gen.report.analysis import (
     doubt_table,
     limit_table,
     structure_of,
-    uplift_words,
 )
 from msfp_gen.report.compared import COMPARISONS, compared_table
 from msfp_gen.report.repeated import FINER, has_vertical, shear_share
 from msfp_gen.scene.file.source import scene_of
 from msfp_gen.studies.assessment.rows import read_study
 from msfp_gen.studies.bounding import CASES, bound_suite, load_suite_bounds, suite_study
+from msfp_gen.studies.bounding.suite import uplift_words
 
 SUITE = """
 records = [

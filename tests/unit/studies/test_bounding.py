@@ -42,15 +42,18 @@ from msfp_gen.studies import read_study
 from msfp_gen.studies.bounding import (
     CASES,
     Bounds,
+    SuiteBounds,
     bound,
     bound_suite,
     bounded_scenes,
     factor_tables,
     load_factors,
+    load_suite_bounds,
     suite_study,
 )
 from msfp_gen.studies.bounding.factors import _read
 from msfp_gen.studies.bounding.runs import _scaled, bounded_scene, bounding_tables, plot_bounds
+from msfp_gen.studies.bounding.suite import uplift_words
 from msfp_gen.studies.workers import Workers
 
 ASCE = ((1 + 0.75 * 0) * 0.7 * 0.85, (1 + 0.75 * (1.3 * 1.2 - 1)) * 1.3 * 1.15)
@@ -413,6 +416,20 @@ def test_a_suite_at_bounds_is_that_of_its_records(tmp_path: Path, capsys: Any) -
         assert float(row["envelope of worst"]) == pick(map(pick, by_case.values()))
         assert row["governs"] == pick(means, key=means.__getitem__)
     assert rows["capacity left of surface 2"]["of"] == "surface 2" and rows["peak displacement"]["of"] == ""
+    check_uplift_words(load_suite_bounds(out)[1], rows["least normal force over the load at rest"], printed)
+
+
+def check_uplift_words(found: SuiteBounds, row: dict[str, str], printed: str) -> None:
+    """How far the normal force fell, and in how many runs uplift was simulated; also of runs that simulate it."""
+    assert 0 < float(row["envelope of worst"]) < 1  # of runs with the vertical component
+    fell = f"{float(row['envelope of worst']):.3g} of the load at rest, under {row['worst record']}"
+    (words,) = uplift_words(found)
+    assert fell in words and words in printed and words.startswith("No run simulated uplift")
+    heights = np.full_like(found.values["maximum_uplift"], np.nan)
+    for height, begins in ((0.0, "The bearing opened in no run: "), (0.004, "The bearing opened, by at most 4 mm: ")):
+        heights[0, 0] = height
+        (words,) = uplift_words(dataclasses.replace(found, values={**found.values, "maximum_uplift": heights}))
+        assert words.startswith(begins) and fell in words and words.endswith(f" in 1 of {heights.size} runs.")
 
 
 def test_a_suite_of_a_building_has_the_names_of_its_bearings() -> None:
