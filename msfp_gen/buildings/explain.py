@@ -6,7 +6,7 @@ from collections.abc import Hashable, Iterable, Iterator
 
 import numpy as np
 
-from msfp_gen.buildings.notes import building_doubts, shared
+from msfp_gen.buildings.notes import building_doubts, ground_doubts, shared
 from msfp_gen.buildings.scene import BuildingScene, remaining_loads, standing_below
 from msfp_gen.common.tables import Table, vector
 from msfp_gen.results.note import Note
@@ -122,11 +122,14 @@ def _interfaces(scene: BuildingScene) -> Iterator[Table]:
 
 
 def _doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
-    """Doubts about interfaces and building; `_kinds` has the doubts about bearings."""
+    """Doubts about interfaces, the ground and the building; `_kinds` has the doubts about bearings."""
     notes = shared(
         Note(0.0, "value", *doubt, bearing=number)
         for number, (mount, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True), start=1)
-        for doubt in unsteady("interface.rotational_stiffness", *standing_below(mount, load)[:2])
+        for doubt in (
+            *unsteady("interface.rotational_stiffness", *standing_below(mount, load)[:2]),
+            *ground_doubts(mount),
+        )
     )
     yield from ((0, note.value, f"{scene.label(note.bearing - 1)}: {note.text}") for note in notes)
     yield from building_doubts(scene)
