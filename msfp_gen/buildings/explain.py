@@ -45,7 +45,7 @@ def explain(scene: BuildingScene) -> list[Table]:
 def frame_table(scene: BuildingScene) -> Table:
     """Weight, degrees of freedom, diaphragms, other nodes and frequencies of the building."""
     building, listed = scene.building, scene.building.frequencies[:LISTED]
-    more = f", ... of {len(building.frequencies)}" if len(building.frequencies) > LISTED else ""
+    more = f", the first {LISTED} of {len(building.frequencies)}" if len(building.frequencies) > LISTED else ""
     listed_nodes: dict[str, list[str]] = {"diaphragms": [], "nodes": []}
     for node in building.nodes:
         listed_nodes["diaphragms" if node.floor else "nodes"].append(f"{node.name} ({vector(node.position)} m)")
@@ -53,7 +53,7 @@ def frame_table(scene: BuildingScene) -> Table:
         ("weight", f"{scene.weight * 1e-6:.5g} MN at g = {scene.gravity:g} m/s^2"),
         ("degrees of freedom", str(len(building.mass))),
         *((name, ", ".join(places)) for name, places in listed_nodes.items() if places),
-        ("frequencies on a fixed base", f"{vector(listed)}{more} Hz" if len(listed) else "none: a rigid body"),
+        ("frequencies on a fixed base", f"{vector(listed)} Hz{more}" if len(listed) else "none: a rigid body"),
     ]
     return Table("building", (), rows)
 

@@ -219,8 +219,10 @@ def summary_of_bearing(one: Result) -> dict[str, Any]:
 
 def _least_ratio(one: Result) -> float | None:
     """Least normal force of any surface of a bearing alone over the load at rest; None without one."""
-    (load,) = one.scene.loads_at_rest
-    return max(float(one.extremes.least_normal.min()), 0.0) / load if load > 0 else None
+    (load,), lift = one.scene.loads_at_rest, one.extremes.lift
+    opened = lift is not None and lift.max() > 0
+    least = 0.0 if opened else float(one.extremes.least_normal.min())
+    return max(least, 0.0) / load if load > 0 else None
 
 
 def uplift_of(one: Result) -> dict[str, Any]:

@@ -36,7 +36,7 @@ from msfp_gen import (
 )
 from msfp_gen.cli import main
 from msfp_gen.figures.style import COLOURS, distinct
-from msfp_gen.results.quantities import quantities
+from msfp_gen.results.quantities import Quantity, Source, quantities
 from msfp_gen.scene.file.loader import scene_text, toml_table
 from msfp_gen.studies import read_study
 from msfp_gen.studies.bounding import (
@@ -53,7 +53,7 @@ from msfp_gen.studies.bounding import (
 )
 from msfp_gen.studies.bounding.factors import _read
 from msfp_gen.studies.bounding.runs import _scaled, bounded_scene, bounding_tables, plot_bounds
-from msfp_gen.studies.bounding.suite import uplift_words
+from msfp_gen.studies.bounding.suite import suite_bound_tables, uplift_words
 from msfp_gen.studies.workers import Workers
 
 ASCE = ((1 + 0.75 * 0) * 0.7 * 0.85, (1 + 0.75 * (1.3 * 1.2 - 1)) * 1.3 * 1.15)
@@ -426,10 +426,24 @@ def check_uplift_words(found: SuiteBounds, row: dict[str, str], printed: str) ->
     (words,) = uplift_words(found)
     assert fell in words and words in printed and words.startswith("No run simulated uplift")
     heights = np.full_like(found.values["maximum_uplift"], np.nan)
-    for height, begins in ((0.0, "The bearing opened in no run: "), (0.004, "The bearing opened, by at most 4 mm: ")):
-        heights[0, 0] = height
+    closed = f"No bearing opened in any run: the least normal force of a surface was {fell}."
+    opened = f"The bearing opened by at most 4 mm, under {found.records[0]}."
+    for height, begins in (([0.0, np.nan], closed), ([4e-3, 1e-3], opened)):
+        heights[:, 0] = height
         (words,) = uplift_words(dataclasses.replace(found, values={**found.values, "maximum_uplift": heights}))
-        assert words.startswith(begins) and fell in words and words.endswith(f" in 1 of {heights.size} runs.")
+        runs = int((~np.isnan(heights)).sum())
+        assert words == f"{begins} Uplift was simulated in {runs} of {heights.size} runs."
+
+
+def test_no_bound_governs_equal_values_and_no_record_is_their_worst() -> None:
+    """Where nothing opened, the heights are 0 at all bounds and under all records; the envelopes stay."""
+    sources = {name: Source(Quantity("m", name, "most")) for name in ("equal", "differs")}
+    values = {"equal": np.zeros((2, 3)), "differs": np.array([[0.0, 0.0, 0.0], [0.0, 2.0, 1.0]])}
+    found = SuiteBounds("", "asce7", ("A", "B"), (), sources, values, {}, {}, {})
+    equal, differs = found.statistics
+    assert (equal.governs, equal.record, equal.envelope) == ("", "", (0.0, 0.0))
+    assert (differs.governs, differs.record, differs.envelope) == ("nominal", "B", (1.0, 2.0))
+    assert [row[-2:] for row in suite_bound_tables(found)[0].rows] == [("-", "-"), ("nominal", "B")]
 
 
 def test_a_suite_of_a_building_has_the_names_of_its_bearings() -> None:
@@ -538,7 +552,8 @@ def test_a_suite_with_a_failed_run_has_means_of_the_others(upper_fails: None, tm
     found = json.loads(capsys.readouterr().out)
     assert found["left_out"] == ["ridgecrest-2019-ci-clc"] and found["records"] == ["ridgecrest-2019-ci-ccc"]
     row = statistics(out)["peak displacement"]
-    assert row["governs"] and float(row["envelope of means"]) > 0 and found["means"] == {}
+    assert float(row["envelope of means"]) > 0 and found["means"] == {}
+    assert row["governs"] == ""  # the three runs are one
 
 
 def test_a_suite_that_was_interrupted_continues(monkeypatch: Any, tmp_path: Path, capsys: Any) -> None:
