@@ -202,6 +202,24 @@ def test_a_bearing_with_ground_of_its_own_is_named_once() -> None:
     assert len(refused) == 1 and refused[0].startswith(f"{scene.label(0)}: motion: the peak acceleration")
 
 
+@pytest.mark.parametrize(
+    ("name", "m", "p"),
+    [
+        (TEST, 3, 1), (TEST, 1, 3), ("quintuple-push", 4, 2), ("quintuple-push", 2, 4),
+        ("double-articulated-push", 2, 1), ("single-articulated-push", 2, 0), ("single-articulated-push", 0, 2),
+    ],
+)  # fmt: skip
+def test_m_and_p_against_the_order_of_the_surfaces_are_named(name: str, m: int, p: int) -> None:
+    """By a doubt, or by an error, about the sliders, which then lie in other dishes."""
+    table = tomllib.loads(scene_text(load_scene(name)))
+    table["bearing"]["layout"].update(m=m, p=p)
+    try:
+        texts = doubts(scene_from_table(table))
+    except InputError as error:
+        texts = [str(error)]
+    assert any("rim_radius" in text for text in texts), texts
+
+
 def test_more_than_critical_damping_is_refused() -> None:
     """A file cannot give it as a ratio, but a building of matrices may have it."""
     scene = building({})
