@@ -551,7 +551,7 @@ def _rest(bounds: SuiteBounds) -> tuple[str, ...]:
     if "residual_displacement" in bounds.undefined:
         return ("No residual displacement is stated: some runs end while the structure still moves.",)
     found = [one for one in bounds.statistics if one.name == "residual_displacement"]
-    return tuple(f"Residual displacement: at most {1e3 * one.envelope[1]:.4g} mm, under {one.record}." for one in found)
+    return tuple(f"Residual displacement: at most {1e3 * one.envelope[1]:.4g} mm{one.under}." for one in found)
 
 
 def _energy(rows: Any, compared: str, scale: str) -> list[str]:

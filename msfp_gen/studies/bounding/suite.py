@@ -70,6 +70,11 @@ class Statistic:
     record: str
 
     @property
+    def under(self) -> str:
+        """The record with the worst value, as the end of a sentence."""
+        return f", under {self.record}" if self.record else ""
+
+    @property
     def envelope(self) -> tuple[float | None, float]:
         """The worst mean, None unless all means are of the same records, and the worst value over the cases [SI]."""
         worst_of = WORST[self.extreme]
@@ -411,7 +416,7 @@ def uplift_words(bounds: SuiteBounds) -> tuple[str, ...]:
     heights = bounds.values["maximum_uplift"] if alone else np.zeros(0)
     simulated = int((~np.isnan(heights)).sum())
     force = "normal force of a surface" if alone else "axial force of a bearing"
-    fell = f"the least {force} was {least.envelope[1]:.3g} of the load at rest{_under(least)}"
+    fell = f"the least {force} was {least.envelope[1]:.3g} of the load at rest{least.under}"
     where = "every run" if simulated == heights.size else f"{simulated} of {heights.size} runs"
     runs = f" Uplift was simulated in {where}." if alone else ""
     if alone and not simulated:
@@ -421,13 +426,9 @@ def uplift_words(bounds: SuiteBounds) -> tuple[str, ...]:
     highest = max(opened, key=lambda one: one.envelope[1], default=None)
     if highest is not None and (height := highest.envelope[1]) > 0:
         which = "The bearing" if alone else f"Bearings opened, {highest.part} the farthest: a surface"
-        return (f"{which} opened by at most {1e3 * height:.3g} mm{_under(highest)}.{runs}",)
+        return (f"{which} opened by at most {1e3 * height:.3g} mm{highest.under}.{runs}",)
     until = " before it ended" if not bounds.ended.all() else ""
     return (f"No bearing opened in any run{until}: {fell}.{runs}",)
-
-
-def _under(statistic: Statistic) -> str:
-    return f", under {statistic.record}" if statistic.record else ""
 
 
 def _counted(bounds: SuiteBounds) -> str:
