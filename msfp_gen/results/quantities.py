@@ -76,6 +76,7 @@ BEARING = RUN | {
     "peak_sliding": Quantity("m", "peak_sliding.*", kept=True, extreme="most"),
     "minimum_gap": Quantity("m", "minimum_gap.*", extreme="least"),
     "minimum_normal_force": Quantity("N", "minimum_normal_force.*", extreme="least"),
+    "minimum_load_ratio": Quantity("", "minimum_load_ratio", "least", words="least normal force over the load at rest"),
     "maximum_normal_force": Quantity("N", "maximum_normal_force.*", extreme="most"),
     "least_friction": Quantity("", "least_friction.*", extreme="least"),
     "most_friction": Quantity("", "most_friction.*", extreme="most"),
