@@ -20,6 +20,7 @@ _NAMES = re.compile(r"(ivar|vartype) ([^\s,]+(?:, [^\s,]+)+)")
 _SHORTER = (
     (r"[~.\w]*_Buffer \| .*?_NestedSequence\[complex \| bytes \| str\]", "array_like"),  # in a union: no alias there
     (r"~?(?:numpy\.)?ndarray\[tuple\[\S*Any, \.\.\.\], \S*float64\]\]", "ndarray"),
+    (r"\bArray\b", "ndarray"),  # as napoleon has it
     (r"TypeAliasForwardRef\('(\w+)'\)", r"\1"),
     (r"dataclasses\.InitVar\[(.*)\]", r"\1"),
     (r"(?<![~.\w])(?:msfp_gen|collections|typing|numpy)\.", r"~\g<0>"),
