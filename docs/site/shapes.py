@@ -8,7 +8,7 @@ from docutils import nodes
 from PIL import Image
 from sphinx.application import Sphinx
 
-CELL, NAME = 14, 40  # letters of a cell, and of one name or command, that stay in one line
+CELL, NAME = 14, 32  # letters of a cell, and of one name or command, that stay in one line
 
 
 def true_size(app: Sphinx, page: nodes.document) -> None:
