@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from msfp_gen.auditing.checks import CHECKS, CONSISTENT, INCONSISTENT, OPEN, AuditCase, Finding
+from msfp_gen.auditing.case import CONSISTENT, INCONSISTENT, OPEN, AuditCase, Finding
+from msfp_gen.auditing.checks import CHECKS
 from msfp_gen.auditing.columns import histories_from, read_histories
 from msfp_gen.auditing.corrections import corrected
 from msfp_gen.auditing.histories import Histories

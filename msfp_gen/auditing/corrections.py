@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from msfp_gen.auditing.checks import INCONSISTENT, OPEN, Answer, stated_mass
+from msfp_gen.auditing.case import INCONSISTENT, OPEN, Answer, stated_mass
 from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.momentum import momentum
 from msfp_gen.auditing.sliding import CLOSED, ERRORS, Sliding

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.auditing.checks import CONSISTENT, INCONSISTENT, NONE, OPEN, SHOWN, Drawing, Finding
+from msfp_gen.auditing.case import CONSISTENT, INCONSISTENT, NONE, OPEN, SHOWN, Drawing, Finding
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.common.version import __version__

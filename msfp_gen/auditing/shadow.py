@@ -14,11 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.auditing.checks import INCONSISTENT, NO_TENSION
+from msfp_gen.auditing.case import INCONSISTENT
 from msfp_gen.auditing.columns import histories_from
 from msfp_gen.auditing.corrections import corrected
 from msfp_gen.auditing.driving import LEAST_LOAD, even_load, opening_scene, opens, shadow_scene
 from msfp_gen.auditing.histories import QUANTITIES, Histories
+from msfp_gen.auditing.mechanics import NO_TENSION
 from msfp_gen.auditing.stated import Stated, stated_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError

@@ -11,7 +11,8 @@ from support.audits import WEIGHT, rows_of, shaken, with_columns, with_force
 
 from msfp_gen import InputError, audit
 from msfp_gen.auditing import Histories
-from msfp_gen.auditing.checks import CHECKS, CONSISTENT, INCONSISTENT, OPEN, AuditCase
+from msfp_gen.auditing.case import CONSISTENT, INCONSISTENT, OPEN, AuditCase
+from msfp_gen.auditing.checks import CHECKS
 from msfp_gen.auditing.corrections import corrected
 from msfp_gen.auditing.stated import stated_of
 

@@ -1,0 +1,232 @@
+"""Checks by mechanics alone: weight, inertia, tension, energy, travel, and the rise of the mass."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from msfp_gen.auditing.case import (
+    BOUND_FLOOR,
+    CONSISTENT,
+    FLOOR,
+    INCONSISTENT,
+    NONE,
+    OPEN,
+    Answer,
+    AuditCase,
+    Drawing,
+    course,
+    si,
+    thinned,
+    work_of,
+)
+from msfp_gen.auditing.momentum import momentum
+from msfp_gen.auditing.sliding import NEAR_RIM
+
+TWICE, HALF = "twice the number", "half"
+NO_TENSION = 1e-3  # tension over the load at rest that a stiff contact may have
+LEAST_VERTICAL = 0.005  # vertical acceleration over gravity from which on a mass follows from it
+GIVEN_BACK = 0.01  # of the energy lost
+WEIGHT_FLOOR = 0.05  # of the axial force at rest: bearings of one layout carry different shares
+MULTIPLES = {2.0: TWICE, 0.5: HALF, 3.0: "three times the number", 1 / 3: "a third", 0.25: "a quarter"}
+
+
+def weight(case: AuditCase) -> Answer:
+    """Axial force at rest against the mass."""
+    if lack := case.lacks("axial"):
+        return lack
+    if case.mass is None:
+        return Answer(OPEN, "no mass is stated; give `mass` in the map, or a scene with a supported mass")
+    carried = case.data.at_rest * case.data.bearings / case.stated.bearing.gravity
+    ratio = carried / case.mass
+    count = f"{case.data.bearings:g} bearing{'s' * (case.data.bearings != 1)}"
+    text = (
+        f"{count} of {si(case.data.at_rest, 'N')} at rest carry {carried:.4g} kg; the mass stated is {case.mass:.4g} kg"
+    )
+    drawing = course("axial force", case.data.time, case.data.axial / 1e3, "axial force [kN]")
+    if abs(ratio - 1.0) <= WEIGHT_FLOOR:
+        return Answer(CONSISTENT, text, ratio, NONE)
+    if case.data.bearings > 1 and not _multiple(ratio):
+        return Answer(OPEN, f"{text}, {ratio:.3g} of it: bearings need not share it equally", ratio, NONE)
+    hint = f": {_multiple(ratio)} of the bearings, or of the mass, took part" if _multiple(ratio) else ""
+    return Answer(INCONSISTENT, f"{text}, {ratio:.3g} of it{hint}", ratio, NONE, None, drawing)
+
+
+def _multiple(ratio: float) -> str:
+    """Words for a ratio near a small whole number or its inverse."""
+    return next((word for value, word in MULTIPLES.items() if abs(ratio / value - 1) < WEIGHT_FLOOR), "")
+
+
+def mass(case: AuditCase) -> Answer:
+    """Inertia: shear over acceleration against the weight."""
+    if lack := case.lacks("force", "axial"):
+        return lack
+    found = case.momentum
+    if found is None:
+        return Answer(OPEN, "no column acceleration of the supported mass, nor its position; with one this is decided")
+    if not found.one_mass:
+        text = (
+            f"force and acceleration are proportional only to {100 * found.correlation**2:.3g} % "
+            "(squared correlation): "
+            "the acceleration does not belong to all the mass above; a column of the mean acceleration would decide"
+        )
+        return Answer(OPEN, text, found.correlation**2, NONE)
+    carried = case.data.at_rest * case.data.bearings / case.stated.bearing.gravity
+    expected, source = (carried, "the weight on the bearings") if case.mass is None else (case.mass, "the mass stated")
+    implied, ratio = found.mass, found.mass / carried
+    text = f"shear over acceleration implies {implied:.4g} kg, the weight on the bearings at rest {carried:.4g} kg"
+    if case.mass is not None:
+        text += f", the mass stated is {expected:.4g} kg"
+    slope = np.sign(found.correlation) * expected  # the force of other programs may be the one on the mass
+    drawing = Drawing(
+        [("windows", found.acceleration, found.force), (source, found.acceleration, slope * found.acceleration)],
+        "acceleration [m/s²]", "force of all bearings [N]",
+        (float(found.acceleration[found.row]), float(found.force[found.row])), True,
+    )  # fmt: skip
+    if abs(ratio - 1.0) <= FLOOR + found.error:
+        return Answer(CONSISTENT, text, implied, "kg", None, drawing)
+    hint = {TWICE: "inertia acts twice", HALF: "half of the inertia acts"}.get(_multiple(ratio), "")
+    hint = hint or f"the inertia that acts is {ratio:.3g} of what the weight has"
+    return Answer(INCONSISTENT, f"{text}: {hint}", implied, "kg", found.time, drawing)
+
+
+def vertical_mass(case: AuditCase) -> Answer:
+    """Axial force against vertical acceleration."""
+    if lack := case.lacks("axial"):
+        return lack
+    data, gravity = case.data, case.stated.bearing.gravity
+    found = momentum(data, vertical=True)
+    if found is None:
+        return Answer(OPEN, "no column acceleration_3 or position_3 of the supported mass; with one this is decided")
+    if found.spread < LEAST_VERTICAL * gravity:
+        return Answer(OPEN, f"the vertical acceleration is {found.spread:.2g} m/s² RMS: too little to decide")
+    if not found.one_mass:
+        return Answer(
+            OPEN,
+            "the axial force does not follow this vertical acceleration; one of the mass on this bearing would decide",
+        )
+    ratio = found.mass * gravity / (data.at_rest * data.bearings)
+    text = (
+        f"axial force over vertical acceleration implies {found.mass:.4g} kg, {ratio:.3g} of what the "
+        "weight at rest has"
+    )
+    drawing = Drawing(
+        [("windows", found.acceleration, found.force)], "vertical acceleration [m/s²]", "axial force [N]", None, True
+    )
+    close = abs(ratio - 1.0) <= FLOOR + found.error
+    return Answer(CONSISTENT if close else INCONSISTENT, text, found.mass, "kg", None if close else found.time, drawing)
+
+
+def tension(case: AuditCase) -> Answer:
+    """Tension of the bearing."""
+    if lack := case.lacks("axial"):
+        return lack
+    data = case.data
+    row = int(data.axial.argmin())
+    least = float(data.axial[row])
+    drawing = course("axial force", data.time, data.axial / 1e3, "axial force, compression positive [kN]", row)
+    if least >= -NO_TENSION * data.at_rest:
+        return Answer(
+            CONSISTENT,
+            f"the least axial force is a compression of {si(abs(max(least, 0.0)), 'N')}",
+            least,
+            "N",
+            float(data.time[row]),
+            drawing,
+        )
+    rows = data.axial < -NO_TENSION * data.at_rest
+    span = float((np.gradient(data.time) * rows).sum())
+    text = (
+        f"the bearing pulls with up to {si(-least, 'N')}, in tension for {span:.3g} s in all; its "
+        "surfaces transmit none "
+        "and would have opened"
+    )
+    return Answer(INCONSISTENT, text, least, "N", float(data.time[row]), drawing)
+
+
+def energy(case: AuditCase) -> Answer:
+    """Energy that the bearing dissipates."""
+    if lack := case.lacks("displacement", "force", "axial"):
+        return lack
+    data, stated = case.data, case.stated
+    if np.hypot(*data.displacement.T).max() > NEAR_RIM * stated.first_rim:
+        return Answer(OPEN, "rims store energy too, which these columns do not tell apart; `msfp-gen shadow` does")
+    spring = data.axial[:, None] * data.displacement / stated.radius
+    lost = work_of(data.force - spring, data.displacement)
+    coarse = np.interp(data.time, data.time[::2], work_of((data.force - spring)[::2], data.displacement[::2]))
+    back = np.maximum.accumulate(lost) - lost
+    row = int(back.argmax())
+    # Links may tilt against each other by their friction, and stuck friction is elastic: both give energy back.
+    most = max(link.friction for link in stated.links)
+    stored = float(data.axial.max()) * (
+        2.0 * stated.radius * most**2 * (not stated.rigid) + 2.0 * stated.friction * stated.yielding
+    )
+    error = float(np.abs(lost - coarse).max()) / 3.0
+    permitted = 1.5 * stored + 3 * error + GIVEN_BACK * max(float(lost[-1]), 0.0)
+    text = (
+        f"the bearing dissipates {si(float(lost[-1]), 'J')}; it gives back {si(float(back[row]), 'J')} at most, "
+        f"where {si(permitted, 'J')} is permitted: one and a half times the {si(stored, 'J')} that links and stuck "
+        f"friction store, the error of the rows, and {100 * GIVEN_BACK:g} % of the loss"
+    )
+    drawing = course("dissipated", data.time, lost / 1e3, "dissipated [kJ]", row)
+    if back[row] <= permitted:
+        return Answer(CONSISTENT, text, float(lost[-1]), "J", None, drawing)
+    return Answer(INCONSISTENT, text + ": it makes energy", float(-back[row]), "J", float(data.time[row]), drawing)
+
+
+def travel(case: AuditCase) -> Answer:
+    """Displacement against the rims."""
+    if lack := case.lacks("displacement"):
+        return lack
+    data, stated = case.data, case.stated
+    size = np.hypot(*data.displacement.T)
+    row = int(size.argmax())
+    text = (
+        f"the largest displacement is {1e3 * size[row]:.4g} mm; the last slider meets its rim at "
+        f"{1e3 * stated.capacity:.4g} mm"
+    )
+    drawing = course("displacement", data.time, 1e3 * size, "displacement [mm]", row)
+    if size[row] <= stated.capacity * (1 + BOUND_FLOOR):
+        return Answer(CONSISTENT, text, float(size[row]), "m", float(data.time[row]), drawing)
+    return Answer(
+        INCONSISTENT,
+        f"{text}: the rims were left out, or have no stiffness",
+        float(size[row]),
+        "m",
+        float(data.time[row]),
+        drawing,
+    )
+
+
+def lift(case: AuditCase) -> Answer:
+    """Rise of the mass on the dish."""
+    if lack := case.lacks("displacement"):
+        return lack
+    data, stated = case.data, case.stated
+    if "rise" not in data.columns:
+        return Answer(OPEN, "no column rise, of the upper plate against the lower one; with it this can be decided")
+    size = np.hypot(*data.displacement.T)
+    expected = size**2 / (2 * stated.radius)
+    row = int(expected.argmax())
+    rise = data.columns["rise"] - data.columns["rise"][0]
+    if expected[row] < 1e-4 or np.std(rise) == 0 == np.std(expected):
+        return Answer(OPEN, f"the mass rises by {1e3 * expected[row]:.2g} mm at most: too little to decide")
+    slope = float(np.polyfit(expected, rise, 1)[0])
+    text = f"on the dish the mass rises by {1e3 * expected[row]:.3g} mm, u²/(2 L); the data have {slope:.2g} of it"
+    drawing = Drawing(
+        [
+            ("data", thinned(1e3 * size), thinned(1e3 * rise)),
+            ("u²/(2 L)", thinned(1e3 * size), thinned(1e3 * expected)),
+        ],
+        "displacement [mm]", "rise [mm]", (1e3 * float(size[row]), 1e3 * float(rise[row])), True,
+    )  # fmt: skip
+    # Of links that tilt by different angles the rise is larger than of one; lifted surfaces raise it too.
+    if slope >= 0.5:
+        return Answer(CONSISTENT, text, slope, NONE, float(data.time[row]), drawing)
+    return Answer(
+        INCONSISTENT,
+        f"{text}: the vertical motion is not coupled to the horizontal one",
+        slope,
+        NONE,
+        float(data.time[row]),
+        drawing,
+    )
