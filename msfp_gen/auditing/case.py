@@ -108,6 +108,26 @@ class AuditCase:
         return stated_mass(self.uncorrected, self.stated)
 
     @cached_property
+    def parted(self) -> bool:
+        """Whether surfaces may have parted."""
+        return "axial" in self.data.columns and bool(self.data.below(CLOSED).any())
+
+    @cached_property
+    def rest_error(self) -> float:
+        """Relative error of the axial force at rest, where surfaces may have parted: its rows miss impacts."""
+        return abs(self.data.before / self.data.at_rest - 1.0) if self.parted else 0.0
+
+    def lacks_rest(self) -> Answer | None:
+        """The answer where the axial force at rest does not follow from the data."""
+        if self.rest_error <= FLOOR:
+            return None
+        text = (
+            f"surfaces may have parted, and the mean axial force of {si(self.data.at_rest, 'N')} is not the "
+            f"{si(self.data.before, 'N')} before the motion; rows closer together, from rest to rest, would decide"
+        )
+        return Answer(OPEN, text)
+
+    @cached_property
     def shear_ratio(self) -> Array:
         """Horizontal force over axial force, (T, 2) [-]; 0 where it may be opening."""
         data = self.data

@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from msfp_gen.auditing.histories import Histories
+from msfp_gen.auditing.histories import Flags, Histories
 from msfp_gen.auditing.stated import Stated
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
@@ -30,11 +29,9 @@ SAME_MOTION = 0.02  # RMS difference between the displacement and the motion of 
 ENDS = ("lower", "upper")
 
 
-def opens(data: Histories) -> NDArray[np.bool_]:
+def opens(data: Histories) -> Flags:
     """Rows after the first motion in which the axial force is nearly zero or a tension, ndarray of bool, shape (T,)."""
-    low: NDArray[np.bool_] = data.axial < LEAST_LOAD * data.at_rest
-    low[: data.moved_at()] = False
-    return low
+    return data.below(LEAST_LOAD)
 
 
 def ends(data: Histories) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from msfp_gen.auditing.case import (
     si,
     thinned,
 )
-from msfp_gen.auditing.sliding import CLOSED, ERRORS, NEAR_RIM
+from msfp_gen.auditing.sliding import ERRORS, NEAR_RIM
 from msfp_gen.common.arrays import Array
 
 COUPLING_FLOOR, HEAT_FLOOR = 0.15, 0.25  # of the parts that follow the axial force, and the temperature
@@ -33,9 +33,10 @@ def friction_bound(case: AuditCase) -> Answer:
         return lack
     data, stated = case.data, case.stated
     size = np.hypot(*data.displacement.T)
-    judged = (data.axial > CLOSED * data.at_rest) & (size < NEAR_RIM * stated.first_rim)
+    judged = case.sliding.closed & (size < NEAR_RIM * stated.first_rim)
     if judged.sum() < 2:
-        return Answer(OPEN, "the slider is at its rims in all rows; rows of smaller displacement would decide")
+        text = "in all rows the slider is at its rims, or its surfaces may have parted just before; others would decide"
+        return Answer(OPEN, text)
     needed = _needed(case)
     most = float(case.sliding.law.cold[judged].max())
     # Theories of large angles differ by as much as the slope of the dish by sine and by tangent.
@@ -229,7 +230,8 @@ def chatter(case: AuditCase) -> Answer:
     if not sliding.enough:
         return Answer(OPEN, sliding.lack)
     rows = sliding.rows
-    relative = sliding.implied / max(float(sliding.law.cold[rows].mean()), 1e-12)
+    # The law takes out what follows a ringing axial force by pressure.
+    relative = 1.0 + (sliding.implied - sliding.law.heated[rows]) / max(float(sliding.law.cold[rows].mean()), 1e-12)
     whole = (np.diff(rows[:-1]) == 1) & (np.diff(rows[1:]) == 1)
     bends = ((relative[2:] - 2 * relative[1:-1] + relative[:-2]) / 2.0)[whole]
     if len(bends) < 10:

@@ -19,11 +19,14 @@ from msfp_gen.auditing.case import (
     thinned,
     work_of,
 )
+from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.momentum import momentum
-from msfp_gen.auditing.sliding import NEAR_RIM
+from msfp_gen.auditing.sliding import CLOSED, NEAR_RIM
+from msfp_gen.auditing.stated import Stated
 
 TWICE, HALF = "twice the number", "half"
 NO_TENSION = 1e-3  # tension over the load at rest that a stiff contact may have
+HANGING = 2.0  # mean pull of a plate that hangs on its support, over its weight: at rest, and as it is caught
 LEAST_VERTICAL = 0.005  # vertical acceleration over gravity from which on a mass follows from it
 GIVEN_BACK = 0.01  # of the energy lost
 WEIGHT_FLOOR = 0.05  # of the axial force at rest: bearings of one layout carry different shares
@@ -36,6 +39,8 @@ def weight(case: AuditCase) -> Answer:
         return lack
     if case.mass is None:
         return Answer(OPEN, "no mass is stated; give `mass` in the map, or a scene with a supported mass")
+    if lack := case.lacks_rest():
+        return lack
     carried = case.data.at_rest * case.data.bearings / case.stated.bearing.gravity
     ratio = carried / case.mass
     count = f"{case.data.bearings:g} bearing{'s' * (case.data.bearings != 1)}"
@@ -43,7 +48,7 @@ def weight(case: AuditCase) -> Answer:
         f"{count} of {si(case.data.at_rest, 'N')} at rest carry {carried:.4g} kg; the mass stated is {case.mass:.4g} kg"
     )
     drawing = course("axial force", case.data.time, case.data.axial / 1e3, "axial force [kN]")
-    if abs(ratio - 1.0) <= WEIGHT_FLOOR:
+    if abs(ratio - 1.0) <= WEIGHT_FLOOR + case.rest_error:
         return Answer(CONSISTENT, text, ratio, NONE)
     if case.data.bearings > 1 and not _multiple(ratio):
         return Answer(OPEN, f"{text}, {ratio:.3g} of it: bearings need not share it equally", ratio, NONE)
@@ -70,6 +75,8 @@ def mass(case: AuditCase) -> Answer:
             "the acceleration does not belong to all the mass above; a column of the mean acceleration would decide"
         )
         return Answer(OPEN, text, found.correlation**2, NONE)
+    if lack := case.lacks_rest():
+        return lack
     carried = case.data.at_rest * case.data.bearings / case.stated.bearing.gravity
     expected, source = (carried, "the weight on the bearings") if case.mass is None else (case.mass, "the mass stated")
     implied, ratio = found.mass, found.mass / carried
@@ -82,7 +89,7 @@ def mass(case: AuditCase) -> Answer:
         "acceleration [m/s²]", "force of all bearings [N]",
         (float(found.acceleration[found.row]), float(found.force[found.row])), True,
     )  # fmt: skip
-    if abs(ratio - 1.0) <= FLOOR + found.error:
+    if abs(ratio - 1.0) <= FLOOR + found.error + case.rest_error:
         return Answer(CONSISTENT, text, implied, "kg", None, drawing)
     hint = {TWICE: "inertia acts twice", HALF: "half of the inertia acts"}.get(_multiple(ratio), "")
     hint = hint or f"the inertia that acts is {ratio:.3g} of what the weight has"
@@ -104,6 +111,8 @@ def vertical_mass(case: AuditCase) -> Answer:
             OPEN,
             "the axial force does not follow this vertical acceleration; one of the mass on this bearing would decide",
         )
+    if lack := case.lacks_rest():
+        return lack
     ratio = found.mass * gravity / (data.at_rest * data.bearings)
     text = (
         f"axial force over vertical acceleration implies {found.mass:.4g} kg, {ratio:.3g} of what the "
@@ -112,7 +121,7 @@ def vertical_mass(case: AuditCase) -> Answer:
     drawing = Drawing(
         [("windows", found.acceleration, found.force)], "vertical acceleration [m/s²]", "axial force [N]", None, True
     )
-    close = abs(ratio - 1.0) <= FLOOR + found.error
+    close = abs(ratio - 1.0) <= FLOOR + found.error + case.rest_error
     return Answer(CONSISTENT if close else INCONSISTENT, text, found.mass, "kg", None if close else found.time, drawing)
 
 
@@ -125,22 +134,31 @@ def tension(case: AuditCase) -> Answer:
     least = float(data.axial[row])
     drawing = course("axial force", data.time, data.axial / 1e3, "axial force, compression positive [kN]", row)
     if least >= -NO_TENSION * data.at_rest:
-        return Answer(
-            CONSISTENT,
-            f"the least axial force is a compression of {si(abs(max(least, 0.0)), 'N')}",
-            least,
-            "N",
-            float(data.time[row]),
-            drawing,
+        text = f"the least axial force is a compression of {si(abs(max(least, 0.0)), 'N')}"
+        return Answer(CONSISTENT, text, least, "N", float(data.time[row]), drawing)
+    span = float((np.gradient(data.time) * (data.axial < -NO_TENSION * data.at_rest)).sum())
+    text = f"the bearing pulls with up to {si(-least, 'N')}, in tension for {span:.3g} s in all"
+    if not holds_down(data, case.stated):
+        text += (
+            "; the upper plate, which hangs on its support where surfaces part, and rims that are inclined pull so "
+            "too: the force through the surfaces, at closer rows, would decide"
         )
-    rows = data.axial < -NO_TENSION * data.at_rest
-    span = float((np.gradient(data.time) * rows).sum())
-    text = (
-        f"the bearing pulls with up to {si(-least, 'N')}, in tension for {span:.3g} s in all; its "
-        "surfaces transmit none "
-        "and would have opened"
-    )
+        return Answer(OPEN, text, least, "N", float(data.time[row]), drawing)
+    text += "; its surfaces transmit none and would have opened"
     return Answer(INCONSISTENT, text, least, "N", float(data.time[row]), drawing)
+
+
+def holds_down(data: Histories, stated: Stated) -> bool:
+    """Whether the bearing pulls more than its upper plate does, which hangs on its support where surfaces part.
+
+    The impulse of the plate while surfaces are parted is its weight times this time, and the change of its velocity,
+    which gravity makes too. A rim is normal to its dish, so that its force pulls by the slope of the dish.
+    """
+    pull = np.maximum(-data.axial - np.hypot(*data.force.T) * stated.steepest, 0.0)
+    lasting = float(np.minimum(pull[1:], pull[:-1]) @ np.diff(data.time))  # a peak of a single row may be any time long
+    parted = float((np.gradient(data.time) * data.below(CLOSED)).sum())
+    plate = stated.bearing.bodies[-1].mass * stated.bearing.gravity
+    return lasting > (HANGING * plate + NO_TENSION * data.at_rest) * parted
 
 
 def energy(case: AuditCase) -> Answer:
@@ -150,9 +168,12 @@ def energy(case: AuditCase) -> Answer:
     data, stated = case.data, case.stated
     if np.hypot(*data.displacement.T).max() > NEAR_RIM * stated.first_rim:
         return Answer(OPEN, "rims store energy too, which these columns do not tell apart; `msfp-gen shadow` does")
-    spring = data.axial[:, None] * data.displacement / stated.radius
-    lost = work_of(data.force - spring, data.displacement)
-    coarse = np.interp(data.time, data.time[::2], work_of((data.force - spring)[::2], data.displacement[::2]))
+    closed = case.sliding.closed
+    if not closed.any():
+        return Answer(OPEN, "surfaces may have parted in every row; rows of smaller motion would decide")
+    friction = (data.force - data.axial[:, None] * data.displacement / stated.radius) * closed[:, None]
+    lost = work_of(friction, data.displacement)
+    coarse = np.interp(data.time, data.time[::2], work_of(friction[::2], data.displacement[::2]))
     back = np.maximum.accumulate(lost) - lost
     row = int(back.argmax())
     # Links may tilt against each other by their friction, and stuck friction is elastic: both give energy back.
@@ -162,8 +183,9 @@ def energy(case: AuditCase) -> Answer:
     )
     error = float(np.abs(lost - coarse).max()) / 3.0
     permitted = 1.5 * stored + 3 * error + GIVEN_BACK * max(float(lost[-1]), 0.0)
+    where = "" if closed.all() else ", in rows in which its surfaces are closed"
     text = (
-        f"the bearing dissipates {si(float(lost[-1]), 'J')}; it gives back {si(float(back[row]), 'J')} at most, "
+        f"the bearing dissipates {si(float(lost[-1]), 'J')}{where}; it gives back {si(float(back[row]), 'J')} at most, "
         f"where {si(permitted, 'J')} is permitted: one and a half times the {si(stored, 'J')} that links and stuck "
         f"friction store, the error of the rows, and {100 * GIVEN_BACK:g} % of the loss"
     )
@@ -185,16 +207,13 @@ def travel(case: AuditCase) -> Answer:
         f"{1e3 * stated.capacity:.4g} mm"
     )
     drawing = course("displacement", data.time, 1e3 * size, "displacement [mm]", row)
-    if size[row] <= stated.capacity * (1 + BOUND_FLOOR):
-        return Answer(CONSISTENT, text, float(size[row]), "m", float(data.time[row]), drawing)
-    return Answer(
-        INCONSISTENT,
-        f"{text}: the rims were left out, or have no stiffness",
-        float(size[row]),
-        "m",
-        float(data.time[row]),
-        drawing,
-    )
+    verdict = CONSISTENT
+    if size[row] > stated.capacity * (1 + BOUND_FLOOR):
+        parted = "axial" in data.columns and data.below(CLOSED)[: row + 1].any()
+        verdict = OPEN if parted else INCONSISTENT
+        text += ": the rims were left out, or have no stiffness"
+        text += ", or parted surfaces passed them" if parted else ""
+    return Answer(verdict, text, float(size[row]), "m", float(data.time[row]), drawing)
 
 
 def lift(case: AuditCase) -> Answer:
@@ -204,13 +223,17 @@ def lift(case: AuditCase) -> Answer:
     data, stated = case.data, case.stated
     if "rise" not in data.columns:
         return Answer(OPEN, "no column rise, of the upper plate against the lower one; with it this can be decided")
-    size = np.hypot(*data.displacement.T)
+    closed = case.sliding.closed  # lifted surfaces raise the mass too
+    size, rise = np.hypot(*data.displacement.T)[closed], (data.columns["rise"] - data.columns["rise"][0])[closed]
+    if len(size) < 2:
+        return Answer(OPEN, "surfaces may have parted in every row; rows of smaller motion would decide")
     expected = size**2 / (2 * stated.radius)
     row = int(expected.argmax())
-    rise = data.columns["rise"] - data.columns["rise"][0]
     if expected[row] < 1e-4 or np.std(rise) == 0 == np.std(expected):
         return Answer(OPEN, f"the mass rises by {1e3 * expected[row]:.2g} mm at most: too little to decide")
-    slope = float(np.polyfit(expected, rise, 1)[0])
+    # The axial force compresses the bearing.
+    axial = data.axial[closed] / data.at_rest if "axial" in data.columns else 0.0 * size
+    slope = float(np.linalg.lstsq(np.column_stack([expected, 0 * size + 1, axial - 1]), rise)[0][0])
     text = f"on the dish the mass rises by {1e3 * expected[row]:.3g} mm, u²/(2 L); the data have {slope:.2g} of it"
     drawing = Drawing(
         [
@@ -219,14 +242,14 @@ def lift(case: AuditCase) -> Answer:
         ],
         "displacement [mm]", "rise [mm]", (1e3 * float(size[row]), 1e3 * float(rise[row])), True,
     )  # fmt: skip
-    # Of links that tilt by different angles the rise is larger than of one; lifted surfaces raise it too.
-    if slope >= 0.5:
-        return Answer(CONSISTENT, text, slope, NONE, float(data.time[row]), drawing)
+    time = float(data.time[closed][row])
+    if slope >= 0.5:  # of links that tilt by different angles the rise is larger than of one
+        return Answer(CONSISTENT, text, slope, NONE, time, drawing)
     return Answer(
         INCONSISTENT,
         f"{text}: the vertical motion is not coupled to the horizontal one",
         slope,
         NONE,
-        float(data.time[row]),
+        time,
         drawing,
     )

@@ -54,6 +54,8 @@ def sampling(case: AuditCase) -> Answer:
     text = f"the work of friction by these rows, {data.step:.3g} s apart, is exact to {100 * error:.2g} %"
     if error <= COARSE:
         return Answer(CONSISTENT, text, 100 * error, "%")
+    if case.parted:
+        return Answer(OPEN, f"{text}; surfaces may have parted, and land by impacts that are shorter", 100 * error, "%")
     text += f"; the bearing moves up to {1e3 * step[row]:.3g} mm between two rows: export rows at a smaller step"
     return Answer(INCONSISTENT, text, 100 * error, "%", float(data.time[row]), loop(case, row))
 

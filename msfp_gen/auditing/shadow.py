@@ -19,7 +19,7 @@ from msfp_gen.auditing.columns import histories_from
 from msfp_gen.auditing.corrections import corrected
 from msfp_gen.auditing.driving import LEAST_LOAD, even_load, opening_scene, opens, shadow_scene
 from msfp_gen.auditing.histories import QUANTITIES, Histories
-from msfp_gen.auditing.mechanics import NO_TENSION
+from msfp_gen.auditing.mechanics import holds_down
 from msfp_gen.auditing.stated import Stated, stated_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
@@ -290,7 +290,7 @@ def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | 
     largest = float(np.hypot(*data.force.T).max())
     others = [np.sqrt(np.mean(np.sum((_force(one, data) - force) ** 2, axis=1))) for one in (finer, coarser)]
     error = float(np.hypot(others[0], others[1] / 3.0)) / largest
-    left_out = tuple(_left_out(scene, result, data, error))
+    left_out = tuple(_left_out(scene, stated, result, data, error))
     notes = [answer.sentence for answer in found.values() if answer.verdict == INCONSISTENT]
     return Shadow(data, stated, result, opened, error, left_out, tuple(notes))
 
@@ -323,10 +323,10 @@ def _variants(scene: Scene, result: Result, data: Histories) -> Iterator[tuple[s
         yield "sliding regimes", lambda one: replace(at_fidelity(one, "equivalent"), duration=one.end)
 
 
-def _left_out(scene: Scene, result: Result, data: Histories, error: float) -> Iterator[LeftOut]:
+def _left_out(scene: Scene, stated: Stated, result: Result, data: Histories, error: float) -> Iterator[LeftOut]:
     """Effects taken out one after the other; those that the element does not have stay out."""
     before = _difference(_force(result, data), data)
-    if data.axial.min() < -NO_TENSION * data.at_rest:
+    if holds_down(data, stated):
         yield LeftOut("lift-off", before, None, True, "its axial force is a tension")
     for name, without in _variants(scene, result, data):
         try:

@@ -122,6 +122,11 @@ class Stated:
     def _tilt_limit(self, link: Link) -> float:
         return link.limit + (0.0 if link.outside is None else self._tilt_limit(self.links[link.outside]))
 
+    @cached_property
+    def steepest(self) -> float:
+        """Largest slope of a rim, the tangent of the largest tilt of a slider [-]."""
+        return float(np.tan(max(self._tilt_limit(link) for link in self.links)))
+
     @property
     def capacity(self) -> float:
         """Displacement at which the last slider meets its rim [m]."""
