@@ -18,11 +18,15 @@ from msfp_gen.auditing.case import (
     si,
     thinned,
 )
-from msfp_gen.auditing.sliding import ERRORS, NEAR_RIM
+from msfp_gen.auditing.driving import force_of, off_centre, shadow_scene
+from msfp_gen.auditing.sliding import ERRORS, THEORY
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.errors import InputError, RunError
+from msfp_gen.simulation.simulate import simulate
 
 COUPLING_FLOOR, HEAT_FLOOR = 0.15, 0.25  # of the parts that follow the axial force, and the temperature
 DAMPING_FLOOR = 0.05  # force along the velocity over friction
+HEATING = ("pvt", "pvtd")  # laws of which a model without heat is pv
 ROUGH = 0.05  # irregularity of a sliding force over friction
 SPIKE = 0.25  # one row off over friction
 
@@ -33,9 +37,9 @@ def friction_bound(case: AuditCase) -> Answer:
         return lack
     data, stated = case.data, case.stated
     size = np.hypot(*data.displacement.T)
-    judged = case.sliding.closed & (size < NEAR_RIM * stated.first_rim)
+    judged = case.sliding.settled
     if judged.sum() < 2:
-        text = "in all rows the slider is at its rims, or its surfaces may have parted just before; others would decide"
+        text = "in all rows a slider is at its rim, or its surfaces may have parted just before; others would decide"
         return Answer(OPEN, text)
     needed = _needed(case)
     most = float(case.sliding.law.cold[judged].max())
@@ -121,10 +125,8 @@ def heat(case: AuditCase) -> Answer:
     law, data, rows = sliding.law, case.data, sliding.rows
     if law.temperature is None:
         return _drift(case)
-    if case.stated.bearing.layout.n > 3:
-        return Answer(
-            OPEN, "which surfaces slide, and heat, does not follow from these columns; `msfp-gen shadow` computes it"
-        )
+    if not case.stated.rigid:
+        return _heat_by_model(case)
     hottest = float(law.temperature.max())
     if np.array_equal(law.heated, law.cold):
         return _drift(case)
@@ -152,6 +154,49 @@ def heat(case: AuditCase) -> Answer:
         return Answer(CONSISTENT, text, factor.value, NONE, None, drawing)
     hint = ": nothing heats" if factor.agrees(0.0, HEAT_FLOOR) else ""
     return Answer(INCONSISTENT, text + hint, factor.value, NONE, float(data.time[law.temperature.argmax()]), drawing)
+
+
+def _heat_by_model(case: AuditCase) -> Answer:
+    """Whether friction falls as in the full model, where surfaces slide in turn and heat by their own slip."""
+    data, sliding, word = case.data, case.sliding, case.stated.law.word if case.stated.law else ""
+    if word not in HEATING:
+        return Answer(OPEN, f"which surfaces slide, and heat, does not follow from these columns under the law {word}")
+    if case.parted:
+        return Answer(
+            OPEN, "surfaces may have parted, so that heat does not follow; rows without lift-off would decide"
+        )
+    if off_centre(data):
+        return Answer(OPEN, "a model has to tell which surfaces slide, and heat; rows from the centre on would decide")
+    scene = shadow_scene(data, case.stated)
+    try:
+        runs = [simulate(scene.with_effects(friction=one)) for one in (word, "pv")]
+    except (InputError, RunError) as failure:
+        return Answer(OPEN, f"a model has to tell which surfaces slide, and heat, and does not run: {failure}")
+    rows = sliding.rows
+    force, heated, cold = (sliding.along(one) for one in (data.force, *(force_of(run, data) for run in runs)))
+    friction = cold - sliding.along(data.displacement) / case.stated.radius * data.axial[rows]
+    parts = np.column_stack([friction, heated - cold])
+    (level, share), *_ = np.linalg.lstsq(parts, force - cold + friction)
+    scatter = np.hypot(np.std(force - cold + friction - parts @ [level, share]), THEORY * np.mean(np.abs(friction)))
+    error = float(scatter * np.sqrt(np.linalg.pinv(parts.T @ parts)[1, 1] * len(rows) / (2 * sliding.strokes)))
+    temperature = runs[0].history.temperature
+    assert temperature is not None  # the law heats
+    text = f"by the full model surfaces reach {temperature.max():.0f} °C and friction falls by up to "
+    text += f"{100 * float(((cold - heated) / np.where(friction > 0, friction, np.inf)).max()):.2g} %"
+    if ERRORS * error > 1.0 - HEAT_FLOOR:
+        return Answer(OPEN, f"{text}: too little to decide")
+    text += f"; the data have {share:.2g} of this fall"
+    drawing = Drawing(
+        [(name, data.time[rows], values / data.axial[rows]) for name, values in (("data less cold model", force - cold),
+         ("heated less cold model", heated - cold))],
+        "time [s]", "friction coefficient", None, True,
+    )  # fmt: skip
+    reach = HEAT_FLOOR + ERRORS * error
+    if abs(share - 1.0) <= reach:
+        return Answer(CONSISTENT, text, float(share), NONE, None, drawing)
+    hint = ": nothing heats" if abs(share) <= reach else ""
+    time = float(data.time[rows[(cold - heated).argmax()]])
+    return Answer(INCONSISTENT, text + hint, float(share), NONE, time, drawing)
 
 
 def _drift(case: AuditCase) -> Answer:

@@ -178,7 +178,7 @@ class Sliding:
             "radius": rest * restoring,
             "friction": rest * law.cold[rows] * arm,
             "heat": rest * heat * arm,
-            "coupling": (axial - rest) * (restoring + law.heated[rows] * arm),
+            "coupling": (axial - rest) * force / axial,  # of the friction that acts, whatever it is
             "damping": speed,
         }
         scale = float(np.abs(force).max())

@@ -141,6 +141,45 @@ def test_the_sentence_of_energy_states_what_is_permitted():
         assert found.verdict == verdict, found.sentence
 
 
+def parting(pull=0.0, rows=1):
+    """The pendulum, which parts for 0.1 s of every second after two seconds, and pulls for some rows of each [N]."""
+    data = pendulum()
+    phase = np.round(100 * (TIME % 1.0)).astype(int)
+    share = np.where((TIME > 2.0) & (phase < 10), 0.0, 1.0)
+    share = np.where((TIME > 2.0) & (phase >= 10), 10.0 / 9.0, share)  # the mean remains
+    pulls = (TIME > 2.0) & (phase >= 3) & (phase < 3 + rows)
+    return with_columns(with_force(data, share), axial=WEIGHT * share - pull * pulls)
+
+
+def test_a_plate_that_hangs_on_its_support_pulls_for_a_moment():
+    plate = SCENE.bearing.bodies[-1].mass * SCENE.bearing.gravity
+    assert finding(parting(), "tension").verdict == CONSISTENT
+    assert finding(parting(8.0 * plate, 1), "tension").verdict == OPEN
+    held = finding(parting(8.0 * plate + 0.01 * WEIGHT, 8), "tension")
+    assert held.verdict == INCONSISTENT and "would have opened" in held.sentence
+
+
+def test_a_rim_that_is_inclined_pulls():
+    """By the slope of its dish at most: more is tension of the bearing."""
+    for ratio, verdict in ((1.1, OPEN), (0.5, INCONSISTENT)):
+        data = parting(0.05 * WEIGHT, 6)
+        side = np.where(data.axial < 0, ratio * 0.05 * WEIGHT / STATED.steepest, 0.0)
+        assert finding(with_force(data, 1.0, np.column_stack([side, 0 * side])), "tension").verdict == verdict
+
+
+def test_what_parted_surfaces_leave_open():
+    """Loads whose mean misses impacts, travel beyond rims, coarse rows: each is inconsistent of a closed bearing."""
+    data = parting()
+    assert finding(data, "weight").verdict == CONSISTENT and finding(data, "weight").value == pytest.approx(1, abs=0.01)
+    short = with_columns(data, axial=np.where(data.axial > WEIGHT, 0.9, 1.0) * data.axial)
+    assert finding(short, "weight").verdict == OPEN and "before the motion" in finding(short, "weight").sentence
+    far = 1.2 * STATED.capacity / np.abs(data.displacement).max()
+    for name, check in ((data.scaled({"displacement_1": far}), "travel"), (rows_of(data, 25), "sampling")):
+        assert finding(name, check).verdict == OPEN
+        closed = with_columns(name, axial=WEIGHT + 0 * name.time)
+        assert finding(closed, check).verdict == INCONSISTENT
+
+
 def test_a_map_is_for_a_file():
     with pytest.raises(InputError, match="only a file needs a map"):
         audit(pendulum(), SCENE, {"columns": {"time": "t [s]"}})
