@@ -183,7 +183,7 @@ def energy(case: AuditCase) -> Answer:
     )
     error = float(np.abs(lost - coarse).max()) / 3.0
     permitted = 1.5 * stored + 3 * error + GIVEN_BACK * max(float(lost[-1]), 0.0)
-    where = "" if closed.all() else ", in rows in which its surfaces are closed"
+    where = ", in rows in which its surfaces are closed" if case.parted else ""
     text = (
         f"the bearing dissipates {si(float(lost[-1]), 'J')}{where}; it gives back {si(float(back[row]), 'J')} at most, "
         f"where {si(permitted, 'J')} is permitted: one and a half times the {si(stored, 'J')} that links and stuck "

@@ -70,6 +70,7 @@ def test_all_rows_but_those_of_other_programs_are_what_runs_give() -> None:
     listed = set(PAGE.splitlines())
     for case in validation.cases(opensees=False):
         assert markdown_row(validation.line(case)) in listed
+    assert validation.plant_words() in PAGE
 
 
 def comparisons() -> list[dict[str, str]]:

@@ -25,7 +25,7 @@ from support.audits import (
 from support.buildings import BEARING, rocking
 
 from msfp_gen import Effects, RunError, audit, changed_scene, load_scene, simulate
-from msfp_gen.auditing import Histories
+from msfp_gen.auditing import Histories, read_histories
 from msfp_gen.auditing.histories import histories_of
 from msfp_gen.auditing.momentum import momentum
 from msfp_gen.auditing.sliding import Sliding
@@ -66,7 +66,7 @@ def test_numbers_of_every_kind(kind):
         assert numbers[name].value == pytest.approx(0.0, abs=0.05)
     assert "at the pivot" in numbers["friction at the pivot"].sentence
     radius = stated_of(KINDS[kind].scene(radius=other_radii)).radius
-    assert numbers["other radius"].value == pytest.approx(radius, rel=0.01)
+    assert numbers["other radius"].value == pytest.approx(radius, rel=0.02)
 
 
 @pytest.mark.parametrize("kind", KINDS_OF_STACKS)
@@ -247,6 +247,24 @@ def test_a_published_plant_has_its_inertia_twice():
     assert "7.495e+07" in found.finding("mass").sentence and "inertia acts twice" in found.finding("mass").sentence
     assert found.finding("friction").value == pytest.approx(1.0, abs=0.01)
     assert found.finding("radius").value == pytest.approx(1.0, abs=0.01)
+    assert found.finding("friction_bound").value == pytest.approx(0.06, abs=1e-4)
+
+
+def test_the_plant_has_constant_friction():
+    """Its force gives the coefficient 0.0600 at any velocity, and 377 MN/m before it slides."""
+    data = read_histories(MAT / "case1.csv", MAT / "map.toml")
+    axial, force, u = data.axial[30:], data.force[30:, 0], data.displacement[30:, 0]
+    speed = np.abs(data.velocity[30:, 0])
+    implied = np.abs(force / axial - u)
+    path = np.cumsum(np.abs(np.diff(u, prepend=u[0])))
+    turned = np.maximum.accumulate(np.where(np.diff(np.sign(np.gradient(u)), prepend=0) != 0, path, 0.0))
+    sliding = (path - turned > 4e-3) & (data.time[30:] > 1.0)
+    for low, high in ((0.002, 0.01), (0.01, 0.05), (0.05, 0.3), (0.3, 1.0)):
+        rows = sliding & (speed > low) & (speed < high)
+        assert rows.sum() > 20 and np.median(implied[rows]) == pytest.approx(0.06, abs=2e-5)
+    stiffness = data.force[1, 0] / data.displacement[1, 0]
+    assert stiffness == pytest.approx(50e6 * np.pi * 0.2**2 * 0.06 / 1e-3, rel=0.01)
+    assert 0.06 * data.at_rest / stiffness == pytest.approx(1.71e-3, rel=0.01)
 
 
 def test_the_page_of_the_plant_prints_what_it_says(capsys, monkeypatch):
@@ -262,7 +280,7 @@ def test_the_page_of_the_plant_prints_what_it_says(capsys, monkeypatch):
 
 @pytest.mark.slow
 def test_the_plant_is_followed_with_inertia_twice():
-    """RMS difference of the displacement over its largest value: 2.5 % with inertia twice, 24 % with it once."""
+    """RMS difference of the displacement over its largest value: 1.8 % with inertia twice, 24 % with it once."""
     apart = {}
     page = (ROOT / "docs" / "audit.md").read_text(encoding="utf-8").split("\n## A published plant\n")[1]
     for times, word in ((1, "once"), (2, "twice")):
@@ -272,7 +290,7 @@ def test_the_plant_is_followed_with_inertia_twice():
         assert row
         stated = [float(text) for text in row.groups()]
         assert stated == pytest.approx([1e3 * ours.max(), -1e3 * ours.min(), 100 * apart[times]], abs=0.1)
-    assert apart[2] == pytest.approx(0.025, abs=2e-3) and apart[1] == pytest.approx(0.24, abs=0.01)
+    assert apart[2] == pytest.approx(0.018, abs=1e-3) and apart[1] == pytest.approx(0.24, abs=0.01)
 
 
 @pytest.mark.slow
