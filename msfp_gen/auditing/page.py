@@ -119,8 +119,9 @@ def audit_opinion(audit: Audit) -> Opinion:
     groups = [
         (word, [one for one in audit.findings if one.verdict == word]) for word in (INCONSISTENT, CONSISTENT, OPEN)
     ]
+    groups.append(("friction coefficient that the data imply", list(audit.figures)))
     title = f"{audit.name} against {audit.bearing}"
-    return Opinion(title, "audit", f"{audit.text}.", "Verdicts", audit.tables[:1], groups, TERMS)
+    return Opinion(title, "audit", f"{audit.text}.", "Verdicts", audit.tables[:-1], groups, TERMS)
 
 
 def shadow_opinion(shadow: Shadow) -> Opinion:

@@ -180,6 +180,30 @@ def test_what_parted_surfaces_leave_open():
         assert finding(closed, check).verdict == INCONSISTENT
 
 
+def test_the_coefficient_is_stated_by_speed_axial_force_and_time():
+    """Friction that falls with the axial force and over time: medians of thirds of the rows, beside the law."""
+    data = pendulum()
+    axial = WEIGHT * (1.0 + 0.3 * np.sin(0.7 * TIME))
+    share = (WEIGHT / axial) ** 0.5 * (1.0 - 0.02 * TIME)
+    friction = STATED.friction * share * np.tanh(data.velocity[:, 0] / 0.005)
+    force = axial * (data.displacement[:, 0] / STATED.radius + friction)
+    found = audit(with_columns(data, axial=axial, force_1=force), SCENE)
+    names = ("speed", "axial force", "time")
+    by = {name: [one for one in found.coefficients if one.quantity == name] for name in names}
+    assert all(len(ranges) == 3 for ranges in by.values())
+    for one in by["axial force"]:
+        assert one.law == pytest.approx(STATED.friction, rel=1e-3) and one.least <= one.median <= one.most
+    low, _, high = by["axial force"]
+    assert low.high < WEIGHT < high.low and low.median > 1.15 * high.median
+    first, _, last = by["time"]
+    assert first.median > 1.05 * last.median and last.high > 19.0
+    assert len(found.as_dict["coefficients"]) == 9 and found.tables[1].rows[3][0] == "axial force"
+    assert [figure.check for figure in found.figures] == ["by_speed", "by_axial force", "by_time"]
+    even = audit(data, SCENE)
+    assert {one.quantity for one in even.coefficients} == {"speed", "time"}  # its axial force is constant
+    assert audit(without(data, "axial"), SCENE).coefficients == ()
+
+
 def test_a_map_is_for_a_file():
     with pytest.raises(InputError, match="only a file needs a map"):
         audit(pendulum(), SCENE, {"columns": {"time": "t [s]"}})
