@@ -211,6 +211,24 @@ def test_sound_results_with_strong_lift_off(scale):
         assert found.finding("weight").value == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("vertical", [5.0, 8.0])
+@pytest.mark.parametrize("law", ["constant", "pvt"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_sound_results_of_stacks_that_lift_off(kind, law, vertical):
+    """Base motions of up to 1.1 and 1.8 g along the vertical: surfaces are open for up to two thirds of the time."""
+    choices = KINDS[kind].choices | {"axes": (0.6, 0.6 * (kind == "triple"), vertical), "law": law, "uplift": True}
+    scene = shaken(**choices)
+    try:
+        data = histories_of(simulate(scene))
+    except RunError as failure:  # a stack that has come apart
+        assert failure.status == "separated"
+        data = histories_of(failure.result)
+    assert data.below(0.02).sum() > 40
+    found = audit(data, scene)
+    assert not found.inconsistent, [finding.sentence for finding in found.inconsistent]
+
+
 def test_sound_results_of_a_building_that_rocks():
     """Two of its bearings lift off; rows of a bearing of a building have the force on its upper plate only."""
     result = simulate(rocking(Effects(uplift=True)))
