@@ -211,6 +211,16 @@ def test_sound_results_with_strong_lift_off(scale):
         assert found.finding("weight").value == pytest.approx(1.0, abs=0.01)
 
 
+def test_rims_that_yield_are_no_missing_rims():
+    """A triple pendulum under a load for which it is not made, 60 mm beyond its last rim; and without the rims."""
+    scene = shaken(bearing="fenz-tfp", scale=0.5, axes=(1.0, 0.0, 0.0), contact_damping=0.0)
+    data = histories_of(simulate(scene))
+    found = audit(data, scene)
+    assert not found.inconsistent and found.finding("travel").value > 0.2
+    sliding = data.axial * (data.displacement[:, 0] / 0.87 + 0.07 * np.sign(data.velocity[:, 0]))
+    assert audit(with_columns(data, force_1=sliding), scene).finding("travel").verdict == "inconsistent"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("vertical", [5.0, 8.0])
 @pytest.mark.parametrize("law", ["constant", "pvt"])
