@@ -168,7 +168,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_a_third_kind_runs_through_everything(file: Path, tmp_path: Path) -> None:
     pair = load_scene(file)
-    assert isinstance(pair, Pair) and "pair" in catalogue.words()
+    assert isinstance(pair, Pair) and "pair" in catalogue.words_of_presets()
     result = simulate(pair, strict=True)
     alone = simulate(pair.half)
     assert isinstance(result, PairResult) and result.scene is pair
@@ -248,7 +248,7 @@ BARE = Kind("pair", lambda *args: Bare(pair_from_table(*args).half), lambda _: i
         (("run", "--duration", "1"), "bare: this system has no field duration; leave out the options that change it"),
         (("bench", "model-error", "--duration", "1"), "bare: this system has no field duration; leave out the options"),
         (("run", "--rtol", "1e-3"), "bare: this system has no field solver; leave out the options that change it"),
-        (("run", "--error", "5%"), "bare: errors of this system cannot be measured, since it has no field solver"),
+        (("run", "--error", "5%"), "bare: this system has no field solver; no error can be measured without it"),
         (("plot", "--figure", "all", "-o", "figures"), "--figure = 'all': this system has no figures; its rows are in"),
         (("plot", "-o", "p.png"), "--figure = 'overview': this system has no figures; its rows are in"),
         (("bound", "-o", "b"), "this system has no bearings that can be changed"),
@@ -299,5 +299,5 @@ def test_what_it_has_not_is_one_line(file: Path) -> None:
 
 
 def test_an_error_cannot_be_asked_without_a_tolerance(file: Path) -> None:
-    with pytest.raises(InputError, match="two: errors of this system cannot be measured, since it has no field solver"):
+    with pytest.raises(InputError, match="two: this system has no field solver"):
         simulate_within(load_scene(file), 0.01)

@@ -35,7 +35,7 @@ from msfp_gen import (
     study,
 )
 from msfp_gen.cli import main
-from msfp_gen.figures.style import COLOURS, distinct
+from msfp_gen.figures.style import COLOURS, distinct_colours
 from msfp_gen.results.quantities import quantities
 from msfp_gen.scene.file.loader import scene_text, toml_table
 from msfp_gen.studies import read_study
@@ -643,5 +643,5 @@ def test_a_run_that_met_its_stop_condition_is_in_no_mean(tmp_path: Path, capsys:
 
 
 def test_records_of_a_suite_have_different_colours() -> None:
-    assert distinct(4) == list(COLOURS[:4])
-    assert all(len(set(distinct(count))) == count for count in (7, 11, 22, 44))
+    assert distinct_colours(4) == list(COLOURS[:4])
+    assert all(len(set(distinct_colours(count))) == count for count in (7, 11, 22, 44))
