@@ -232,18 +232,22 @@ def compile_extension(
         if progress is not None:
             progress(done, len(chains))
     objects = [object_file(name) for name in [*units, wrapper]]
-    target = folder / f"{module}{EXTENSION_SUFFIX}"
-    log.run(
-        BuildStep(target.name, (*_link_command(compiler), *objects, "-o", target.name, *FLAGS["libraries"], *libraries))
-    )
-    if not target.is_file():
-        message = f"{shlex.join(compiler.command)} wrote no {target.name}: this is no C compiler; name one with CC=..."
-        raise CompileError(message, log=log.path)
+    target = _linked(folder / f"{module}{EXTENSION_SUFFIX}", objects, compiler, libraries, log)
     if kept is not None and known is None:
         _keep(kept, (folder / object_file(wrapper)).read_bytes())
     for name in objects:
         (folder / name).unlink()
     (folder / f"{wrapper}.c").unlink(missing_ok=True)
+    return target
+
+
+def _linked(target: Path, objects: Sequence[str], compiler: Compiler, libraries: Sequence[str], log: Log) -> Path:
+    """The extension of these objects. Raises CompileError."""
+    options = (*FLAGS["libraries"], *libraries)
+    log.run(BuildStep(target.name, (*_link_command(compiler), *objects, "-o", target.name, *options)))
+    if not target.is_file():
+        message = f"{shlex.join(compiler.command)} wrote no {target.name}: this is no C compiler; name one with CC=..."
+        raise CompileError(message, log=log.path)
     return target
 
 
