@@ -271,12 +271,20 @@ def test_what_a_kind_does_not_define_is_one_line(
     assert not [path for path in file.parent.iterdir() if path.name in ("c.ck", "figures", "p.png", "b")]
 
 
-def test_a_kind_without_more_runs_and_is_explained(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kind_of_a_dozen_lines_runs_through_everything(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(sys.modules[__name__], "PAIR", BARE)
     kinds.cache_clear()
     bare = load_scene(file)
-    assert np.array_equal(simulate(bare).history.top_force, simulate(bare.whole).history.top_force)
-    assert main(["explain", str(file)]) == 0
+    result = simulate(bare)
+    assert np.array_equal(result.history.top_force, simulate(bare.whole).history.top_force)
+    (again,) = simulate_batch([bare])
+    assert again.summary["peak_force"] == result.summary["peak_force"]
+    assert write_report(result, tmp_path / "bare.html").is_file() and main(["explain", str(file)]) == 0
+    axes = {"load": {"sets": "pair.top.axial_load", "values": [224e3, 112e3]}}
+    study({"scene": str(file), "axes": axes, "keep": []}, tmp_path / "out")
+    assert list(read_study(tmp_path / "out")["status"]) == ["ok", "ok"]
 
 
 def test_a_kind_names_the_table_of_its_bearings(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
