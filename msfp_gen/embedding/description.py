@@ -333,7 +333,7 @@ def _units(root: Xml.Element, unit: UnitDescription) -> None:
     for name in dict.fromkeys(variable.unit for variable in unit.variables):
         exponents = base_units(name) if name != "-" else None
         if exponents is not None:
-            base = Xml.SubElement(Xml.SubElement(definitions, "UnitDescription", name=name), "BaseUnit")
+            base = Xml.SubElement(Xml.SubElement(definitions, "Unit", name=name), "BaseUnit")
             for base_unit, power in exponents.items():
                 base.set(base_unit, str(power))
             if name == CELSIUS:
