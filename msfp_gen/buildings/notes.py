@@ -18,6 +18,7 @@ from msfp_gen.results.note import RISING, Note
 from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.plausibility import (
     LEAST_DAMPING,
+    NUMBER,
     OF_BEARING,
     OF_MOTION,
     OF_RUN,
@@ -79,7 +80,7 @@ def shared(notes: Iterable[Note]) -> list[Note]:
     """The notes on values, with one note, of the first bearing, for all that have such a value at the same place."""
     alike: dict[tuple[int, str], list[Note]] = {}
     for note in notes:
-        words = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "", note.text.partition(":")[0])  # values may differ
+        words = NUMBER.sub("", re.split(r"(?<=\d): ", note.text)[0])  # values may differ, and the reasons after them
         alike.setdefault((note.surface, words), []).append(note)
     return [_with_others(group[0], group) for group in alike.values()]
 
@@ -107,13 +108,20 @@ def _has_rims(mount: BuildingBearing) -> bool:
     return (mount.effects or Auto()).rims is not False
 
 
+def ground_doubts(mount: BuildingBearing) -> Iterator[Doubt]:
+    """Doubts about the motion of the ground that a bearing has of its own."""
+    if mount.motion is not None:
+        yield from (doubt for doubt, _ in judged(OF_MOTION, mount.motion))
+
+
 def value_notes(mount: BuildingBearing, load: float) -> tuple[Note, ...]:
-    """Notes about doubtful values of a bearing and its interface. load: at rest [N]."""
+    """Notes about doubtful values of a bearing, its interface and its own ground. load: at rest [N]."""
     stiffness, needed, _ = standing_below(mount, load)
     doubts = (
         *doubtful_values(mount.bearing, load, _has_rims(mount)),
         *unread_values(mount.bearing, mount.effects or Auto()),
         *unsteady("interface.rotational_stiffness", stiffness, needed),
+        *ground_doubts(mount),
     )
     return tuple(Note(0.0, "value", *doubt) for doubt in doubts)
 
@@ -262,7 +270,8 @@ def _judged_building(scene: BuildingScene) -> Iterator[tuple[Doubt, bool]]:
     heaviest = int(np.argmax(scene.axial_loads))
     bearing, load = scene.bearings[heaviest].bearing, float(scene.axial_loads[heaviest])
     yield from judged(OF_RUN, Subject(bearing, load, limits=scene.limits))
-    yield from judged(OF_MOTION, scene.first_ground)
+    if any(mount.motion is None for mount in scene.bearings):
+        yield from judged(OF_MOTION, scene.motion)
     yield from judged(OF_BUILDING, scene)
 
 
@@ -273,6 +282,10 @@ def refusals(scene: BuildingScene) -> list[str]:
     kinds = {(mount.bearing, _has_rims(mount)): float(load) for mount, load in loads}
     for (bearing, rims), load in kinds.items():
         found += [text for (_, _, text), refused in judged(OF_BEARING, Subject(bearing, load, rims)) if refused]
+    own = {id(mount.motion): index for index, mount in reversed(list(enumerate(scene.bearings))) if mount.motion}
+    for index in sorted(own.values()):
+        judgements = judged(OF_MOTION, scene.bearings[index].motion)
+        found += [f"{scene.label(index)}: {text}" for (_, _, text), refused in judgements if refused]
     return found
 
 

@@ -22,8 +22,8 @@ QUANTITIES = _RUN | {
     "peak_corner_vertical_acceleration": RunQuantity("m/s^2", "peak_corner_acceleration.E3", extreme="most"),
     "peak_drift_ratio": RunQuantity("", "peak_drift_ratio", "most", kept=True),
     "peak_corner_drift_ratio": RunQuantity("", "peak_corner_drift_ratio", "most", words="peak drift ratio at corners"),
-    "minimum_load_ratio": RunQuantity("", "minimum_load_ratio", "least", kept=True),
-    "maximum_load_ratio": RunQuantity("", "maximum_load_ratio", "most"),
+    "minimum_load_ratio": RunQuantity("", "minimum_load_ratio", "least", kept=True, words=LEAST),
+    "maximum_load_ratio": RunQuantity("", "maximum_load_ratio", "most", words=MOST),
     "floor_acceleration": RunQuantity("m/s^2", "floors.*.peak_acceleration.radial", "most", of_parts=True),
     "floor_corner_acceleration": RunQuantity(
         "m/s^2", "floors.*.peak_corner_acceleration.radial", "most", of_parts=True, words="acceleration at corners"

@@ -163,6 +163,7 @@ def _bound_suite(
 ) -> None:
     """`bound` under every motion of a suite: numbers and the figure, without the rows in time of the runs."""
     from msfp_gen.common.output import make_folder
+    from msfp_gen.common.tables import Table
     from msfp_gen.scene.file.source import load_scene
     from msfp_gen.scene.plausibility import require_meant
     from msfp_gen.studies.bounding import factors_of
@@ -183,7 +184,8 @@ def _bound_suite(
         bounds = module.bound_suite(  # force: values have been judged
             study, output, leave_out=leave_out, workers=workers, force=True, progress=update
         )
-    answer(bounds.as_dict(), module.suite_bound_tables(bounds), as_json)
+    uplift = [Table("uplift", (), [(line,) for line in module.uplift_words(bounds)])]
+    answer(bounds.as_dict(), [*module.suite_bound_tables(bounds), *uplift], as_json)
     if output is not None:
         module.plot_suite_bounds(bounds, output / "suite.png")
         numbers = module.write_statistics(bounds, output / "suite.csv")

@@ -19,6 +19,7 @@ from msfp_gen.cli.console import (
     answer,
     interruptible,
     note,
+    note_doubts,
     number,
     numbers,
     say,
@@ -114,8 +115,9 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Run what is missing of a study, or estimate a statistic of it. Ctrl-C at any time: the same command continues."""
+    from msfp_gen.scene.plausibility import require_meant
     from msfp_gen.studies import run as module
-    from msfp_gen.studies.definition import example_text, load_study
+    from msfp_gen.studies.definition import example_text, load_study, study_doubts
 
     if example:
         say(example_text().rstrip("\n"))
@@ -130,14 +132,17 @@ def run(
     question = {
         "quantity": estimate, "statistic": statistic, "threshold": threshold, "target": target, "budget": budget,
     }  # fmt: skip
-    engine: dict[str, Any] = {"workers": workers, "dask": dask, "force": force}
-    if "accuracy" in definition.table or any(value is not None for value in question.values()):
-        if shard is not None:
-            raise InputError("--shard: the runs of an estimate depend on those before; give --workers or --dask")
+    estimated = "accuracy" in definition.table or any(value is not None for value in question.values())
+    if estimated and shard is not None:
+        raise InputError("--shard: the runs of an estimate depend on those before; give --workers or --dask")
+    if plot is not None and not estimated:
+        raise InputError("--plot: it draws an estimate; give --estimate too")
+    require_meant(*definition.ends, force=force)
+    note_doubts(study_doubts(definition))
+    engine: dict[str, Any] = {"workers": workers, "dask": dask, "force": True}  # values have been judged
+    if estimated:
         _estimate(definition, output, question | engine, plot, as_json)
         return
-    if plot is not None:
-        raise InputError("--plot: it draws an estimate; give --estimate too")
     with interruptible(output), ShownProgress(f"{definition.runs} runs") as progress:
         done = module.study(definition, output, shard=part, progress=progress, **engine)
     judged = any(column.name == "limits_exceeded" for column in definition.keep.columns)

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from io import BytesIO, StringIO
+from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -109,6 +110,15 @@ def markdown_table(columns: Sequence[str], rows: Iterable[Iterable[str]]) -> str
 def yes(value: object) -> str:
     """`yes` for a true value, a dash for a false one."""
     return "yes" if value else "-"
+
+
+def decimal_text(value: float) -> str:
+    """A number with four significant digits and at most four decimals, without exponent."""
+    if value == 0:
+        return "0"
+    if abs(value) < 5e-5:
+        return "< 0.0001" if value > 0 else "> -0.0001"
+    return f"{value:.{min(max(3 - floor(log10(abs(value))), 0), 4)}f}"
 
 
 def vector_text(values: Iterable[float], scale: float = 1.0) -> str:

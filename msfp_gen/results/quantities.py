@@ -78,6 +78,9 @@ BEARING = RUN | {
     "peak_sliding": RunQuantity("m", "peak_sliding.*", kept=True, extreme="most"),
     "minimum_gap": RunQuantity("m", "minimum_gap.*", extreme="least"),
     "minimum_normal_force": RunQuantity("N", "minimum_normal_force.*", extreme="least"),
+    "minimum_load_ratio": RunQuantity(
+        "", "minimum_load_ratio", "least", words="least normal force over the load at rest"
+    ),
     "maximum_normal_force": RunQuantity("N", "maximum_normal_force.*", extreme="most"),
     "least_friction": RunQuantity("", "least_friction.*", extreme="least"),
     "most_friction": RunQuantity("", "most_friction.*", extreme="most"),

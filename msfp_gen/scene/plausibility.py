@@ -422,9 +422,10 @@ def doubts(system: Any) -> list[str]:
 
 @doubts.register(Scene)
 def _doubts_of_bearing(system: Scene) -> list[str]:
-    """None where the pendulum is equivalent to a stack, whose values are not given."""
-    stack = system.fidelity != "equivalent"
-    return list(dict.fromkeys(text for _, _, text in scene_doubts(system) if stack))
+    """Those of the motion where the pendulum is equivalent to a stack, whose values are not given."""
+    if system.fidelity == "equivalent":
+        return motion_doubts(system.motion)
+    return list(dict.fromkeys(text for _, _, text in scene_doubts(system)))
 
 
 def motion_doubts(motion: Motion) -> list[str]:

@@ -21,7 +21,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.inputs import expecting
 from msfp_gen.common.output import check_output
-from msfp_gen.common.tables import Table, write_columns
+from msfp_gen.common.tables import Table, decimal_text, write_columns
 from msfp_gen.figures.style import INK, distinct_colours, headline, page, plain
 from msfp_gen.results.quantities import MOVING, ColumnSource
 from msfp_gen.scene.file.catalogue import suggestion
@@ -54,8 +54,9 @@ class Statistic:
 
     name: column of the study. part: name of its bearing, storey, floor or surface; "" for the bearing or building as a
     whole. extreme: whether the largest or the least value is the worst. means: by case, over the runs that ended [SI];
-    None where a run that ended has no value. worst: by case, of all runs, also of those that ended early [SI]. governs:
-    case with the worst mean; "" unless all means are of the same records. record: record with the worst value of all.
+    None where a run that ended has no value. worst: by case, of all runs, also of those that ended early [SI].
+    comparable: whether all means are of the same records. governs: case with the worst mean; "" unless they are, or
+    where all are equal. record: record with the worst value of all; "" where all values are equal.
     """
 
     name: str
@@ -64,14 +65,20 @@ class Statistic:
     extreme: Literal["most", "least", ""]
     means: tuple[float | None, ...]
     worst: tuple[float | None, ...]
+    comparable: bool
     governs: str
     record: str
+
+    @property
+    def under(self) -> str:
+        """The record with the worst value, as the end of a sentence."""
+        return f", under {self.record}" if self.record else ""
 
     @property
     def envelope(self) -> tuple[float | None, float]:
         """The worst mean, None unless all means are of the same records, and the worst value over the cases [SI]."""
         worst_of = WORST[self.extreme]
-        mean = float(worst_of([m for m in self.means if m is not None])) if self.governs else None
+        mean = float(worst_of([m for m in self.means if m is not None])) if self.comparable else None
         return mean, float(worst_of([value for value in self.worst if value is not None]))
 
 
@@ -124,10 +131,12 @@ class SuiteBounds:
         worst_of = WORST[quantity.governs]
         means = self.means(name)
         worst = [None if np.isnan(column).all() else float(worst_of(column)) for column in values.T]
-        same = all((column == self.ended[:, 0]).all() for column in self.ended.T)
-        case = CASES[means.index(worst_of(means))] if same and None not in means else ""
-        record = self.records[int(np.argwhere(values == worst_of(values))[0][0])]
-        return Statistic(name, part, quantity.unit, quantity.governs, means, tuple(worst), case, record)
+        comparable = None not in means and all((column == self.ended[:, 0]).all() for column in self.ended.T)
+        case = CASES[means.index(worst_of(means))] if comparable and len(set(means)) > 1 else ""
+        known = values[~np.isnan(values)]
+        place = int(np.argwhere(values == worst_of(values))[0][0])
+        record = self.records[place] if len(self.records) == 1 or np.ptp(known) else ""
+        return Statistic(name, part, quantity.unit, quantity.governs, means, tuple(worst), comparable, case, record)
 
     @property
     def undefined(self) -> dict[str, str]:
@@ -363,9 +372,9 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
         if not statistic.part:
             unit, scale = shown_as(statistic.unit)
             numbers = (*statistic.means, *statistic.worst)
-            cells = ["-" if value is None else f"{value * scale:.4g}" for value in numbers]
+            cells = ["-" if value is None else decimal_text(value * scale) for value in numbers]
             name = f"{bounds.sources[statistic.name].words(statistic.name)} [{unit}]"
-            rows.append((name, *cells, statistic.governs or "-", statistic.record))
+            rows.append((name, *cells, statistic.governs or "-", statistic.record or "-"))
     marks = {case: "*" if case in bounds.incomplete else "" for case in CASES}
     columns = (
         "",
@@ -392,6 +401,34 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
         Table("runs that failed; of several for the same reason the first message", (), failed),
     ]
     return [table for table in tables if table.rows]
+
+
+def uplift_words(bounds: SuiteBounds) -> tuple[str, ...]:
+    """Whether bearings opened, by how much, and else how far their force fell, in words; empty where it is unknown.
+
+    Of one bearing also in how many runs uplift was simulated.
+    """
+    known = {one.name: one for one in bounds.statistics}
+    least = known.get("minimum_load_ratio")
+    if least is None:
+        return ()
+    alone = "maximum_uplift" in bounds.sources
+    heights = bounds.values["maximum_uplift"] if alone else np.zeros(0)
+    simulated = int((~np.isnan(heights)).sum())
+    force = "normal force of a surface" if alone else "axial force of a bearing"
+    fell = f"the least {force} was {least.envelope[1]:.3g} of the load at rest{least.under}"
+    where = "every run" if simulated == heights.size else f"{simulated} of {heights.size} runs"
+    runs = f" Uplift was simulated in {where}." if alone else ""
+    if alone and not simulated:
+        return (f"No run simulated uplift, which begins where a normal force falls to zero: {fell}.",)
+    names = ("maximum_uplift", "bearing_uplift_height")
+    opened = [one for one in known.values() if (one.name.rpartition("_")[0] if one.part else one.name) in names]
+    highest = max(opened, key=lambda one: one.envelope[1], default=None)
+    if highest is not None and (height := highest.envelope[1]) > 0:
+        which = "The bearing" if alone else f"Bearings opened, {highest.part} the farthest: a surface"
+        return (f"{which} opened by at most {1e3 * height:.3g} mm{highest.under}.{runs}",)
+    until = " before it ended" if not bounds.ended.all() else ""
+    return (f"No bearing opened in any run{until}: {fell}.{runs}",)
 
 
 def _counted(bounds: SuiteBounds) -> str:

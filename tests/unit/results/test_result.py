@@ -170,6 +170,7 @@ def test_summary_knows_the_answers():
     assert summary["peak_sliding"] == rows.sliding.max(axis=0).tolist()
     assert summary["rims_met"] == [1, 4] and min(summary["minimum_gap"]) == pytest.approx(-1e-4)
     assert summary["minimum_normal_force"] == summary["maximum_normal_force"] == [LOAD] * 4
+    assert summary["minimum_load_ratio"] == LOAD / result.scene.loads_at_rest[0]  # with the weights of the bodies
     assert summary["counters"]["steps"] == 2000 and "wall_time" not in summary["counters"]
     assert summary["real_time_factor"] == 80.0
     assert "transitions" not in summary
