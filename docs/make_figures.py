@@ -1,8 +1,11 @@
-"""Draw figures of README, docs/figures.md, tutorial.md and studies.md: `python docs/make_figures.py [FOLDER]`."""
+"""Draw figures of README and of the pages in docs/: `python docs/make_figures.py [FOLDER]`."""
 
 from __future__ import annotations
 
+import base64
+import re
 import shutil
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +28,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from quick import docs_folder, parser, pick
 
 FOLDER = Path(__file__).resolve().parent / "figures"
+EXAMPLES = FOLDER.parents[1] / "examples"
 RECORD = "ridgecrest-2019-ci-clc"
 ROWS = pick(3000, 300)
 DEVICES = {  # preset scene -> name in docs/bearing.md
@@ -34,6 +38,11 @@ DEVICES = {  # preset scene -> name in docs/bearing.md
     "double-articulated-push": "double, articulated",
     "triple-push": "triple",
     "quintuple-push": "quintuple",
+}
+HOSPITAL_DESIGN = {  # figure of docs/hospital.md -> how its caption begins in the report
+    "suite": "Main quantities",
+    "floor-spectra": "Floor spectra",
+    "vertical": "Base shear",
 }
 TOLERANCES = 10.0 ** -np.arange(2, pick(7, 4))
 
@@ -99,6 +108,18 @@ def draw_hospital(folder: Path) -> None:
         shutil.copy(Path(name) / "hospital.png", folder)
 
 
+def draw_hospital_design(folder: Path) -> None:
+    """The sheet of the design in docs/hospital.md, and three figures of its report."""
+    with TemporaryDirectory() as name:
+        short = pick([], ["--short"])
+        subprocess.run([sys.executable, EXAMPLES / "hospital-design" / "design.py", "-o", name, *short], check=True)
+        shutil.copy(Path(name) / "sheet.png", folder / "hospital-design-sheet.png")
+        page = (Path(name) / "report.html").read_text(encoding="utf-8")
+    for figure, begin in HOSPITAL_DESIGN.items():
+        (image,) = re.findall(rf'"Figure \d+\. {begin}[^"]*" src="data:image/webp;base64,([\w+/=]+)"', page)
+        (folder / f"hospital-design-{figure}.webp").write_bytes(base64.b64decode(image))
+
+
 def draw_tutorial(folder: Path) -> None:
     """The figures of the tutorial, made by its own commands."""
     with TemporaryDirectory() as name:
@@ -149,7 +170,7 @@ def draw_demo(folder: Path) -> None:
 def draw_study(folder: Path) -> None:
     """IDA and fragility of the study of docs/studies.md."""
     with TemporaryDirectory() as place:
-        study(FOLDER.parents[1] / "examples" / "fragility" / "study.toml", place)
+        study(EXAMPLES / "fragility" / "study.toml", place)
         rows = read_study(place)
     nominal = rows[rows.bounds == "nominal"]
     plot_ida(
@@ -165,6 +186,7 @@ def main(folder: Path = FOLDER) -> None:
     draw_layouts(folder)
     draw_tutorial(folder)
     draw_hospital(folder)
+    draw_hospital_design(folder)
     draw_record(folder)
     draw_cost(folder)
     draw_demo(folder)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -59,6 +60,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_format = "short"
 autodoc_class_signature = "mixed"
+autodoc_type_aliases = {"Array": "ndarray", "ArrayLike": "array_like"}
 napoleon_use_rtype = False
 napoleon_use_ivar = True
 python_use_unqualified_type_names = True
@@ -88,18 +90,51 @@ sphinx_gallery_conf = {
 }
 
 
+def _mathml(formula: str, display: str) -> str:
+    """MathML of LaTeX; ValueError where a command or an alignment would stand in it as text."""
+    found = convert(formula.replace("{aligned}", "{align*}"), display=display)
+    if re.search(r"<m\w+>(&(?!#)|\\)", found):
+        raise ValueError(f"latex2mathml does not know all of {formula}")
+    return found
+
+
 def _inline(writer: Any, node: nodes.math) -> None:
-    writer.body.append(convert(node.astext()))
+    writer.body.append(_mathml(node.astext(), "inline"))
     raise nodes.SkipNode
 
 
 def _block(writer: Any, node: nodes.math_block) -> None:
-    writer.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>\n')
+    writer.body.append(f'<div class="math">{_mathml(node.astext(), "block")}</div>\n')
     raise nodes.SkipNode
+
+
+# What annotations become in the pages of the Python interface: arrays by their name, fields without their rules.
+TYPES = {
+    r"~numpy[\w.]*\._Buffer \| .*?_NestedSequence\[complex \| bytes \| str\]": "array_like",
+    r"~numpy\.ndarray\[~?tuple\[~typing\.Any, \.\.\.\], ~numpy\.dtype\[~numpy\.\w+\]\]": "ndarray",
+    r"~typ(?:es|ing)\.Annotated"
+    r"\[((?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])+?), ~?[\w.]+\((?:[^()]|\([^()]*\))*\)\]": r"\1",
+}
+
+
+def _types(app: Sphinx, *_: Any) -> None:
+    """Simplify the types of parameters before autodoc shows them."""
+    for shown in app.env.current_document.autodoc_annotations.values():
+        for name in shown:
+            for pattern, simple in TYPES.items():
+                shown[name] = re.sub(pattern, simple, shown[name])
+
+
+def _sentence(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """What stands before a colon in the sentence of a property is no type, as napoleon has it."""
+    if what == "property" and lines:
+        lines[0] = lines[0].replace(": ", " - ", 1)
 
 
 def setup(app: Sphinx) -> None:
     """Formulas become MathML, which browsers draw without a script; the search shows excerpts without a server."""
+    app.connect("object-description-transform", _types, priority=400)
+    app.connect("autodoc-process-docstring", _sentence, priority=400)
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
     app.add_transform(terms.Entries)
     app.connect("html-page-context", excerpts.only_on_search)

@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from msfp_gen.auditing.histories import Flags, Histories
+from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.stated import Stated
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, Flags
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load

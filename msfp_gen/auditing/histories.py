@@ -8,9 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, Flags
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite
 from msfp_gen.results.geometry import body_bases
@@ -34,7 +33,6 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     **{f"temperature_{i}": ("degC", "temperature of surface i at its centre") for i in range(1, 10)},
 }  # fmt: skip
 LEAST_ROWS = 20
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

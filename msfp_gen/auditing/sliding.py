@@ -12,13 +12,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from msfp_gen.auditing.histories import Flags, Histories
+from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.stated import Coefficients, Stated
-from msfp_gen.common.arrays import Array
-
-Rows = NDArray[np.intp]
+from msfp_gen.common.arrays import Array, Flags, Indices
 
 STRAIGHT = 0.99  # chord over arc of a path that is straight, and cosine of the velocity along it
 CLOSED = 0.2  # axial force over that at rest, below which a bearing may be opening
@@ -110,7 +107,7 @@ class Sliding:
         return after
 
     @cached_property
-    def rows(self) -> Rows:
+    def rows(self) -> Indices:
         """Row numbers, ndarray of int, shape (k,)."""
         return np.flatnonzero(self._strokes[1])
 

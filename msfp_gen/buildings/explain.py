@@ -6,9 +6,11 @@ from collections.abc import Hashable, Iterable, Iterator
 
 import numpy as np
 
-from msfp_gen.buildings.notes import building_doubts, shared
-from msfp_gen.buildings.scene import BuildingScene, remaining_loads, standing_below
-from msfp_gen.common.tables import Table, vector
+from msfp_gen.buildings.bearing import standing_below
+from msfp_gen.buildings.effects import remaining_loads
+from msfp_gen.buildings.notes import building_doubts, ground_doubts, shared
+from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.tables import Table, vector_text
 from msfp_gen.results.note import Note
 from msfp_gen.scene.explain import (
     body_table,
@@ -31,7 +33,7 @@ def explain(scene: BuildingScene) -> list[Table]:
     """Tables that describe the scene of a building."""
     return [
         frame_table(scene),
-        bearing_table(scene),
+        bearings_table(scene),
         *_kinds(scene),
         *_interfaces(scene),
         *doubt_tables(_doubts(scene)),
@@ -45,20 +47,20 @@ def explain(scene: BuildingScene) -> list[Table]:
 def frame_table(scene: BuildingScene) -> Table:
     """Weight, degrees of freedom, diaphragms, other nodes and frequencies of the building."""
     building, listed = scene.building, scene.building.frequencies[:LISTED]
-    more = f", ... of {len(building.frequencies)}" if len(building.frequencies) > LISTED else ""
+    more = f", the first {LISTED} of {len(building.frequencies)}" if len(building.frequencies) > LISTED else ""
     listed_nodes: dict[str, list[str]] = {"diaphragms": [], "nodes": []}
     for node in building.nodes:
-        listed_nodes["diaphragms" if node.floor else "nodes"].append(f"{node.name} ({vector(node.position)} m)")
+        listed_nodes["diaphragms" if node.floor else "nodes"].append(f"{node.name} ({vector_text(node.position)} m)")
     rows = [
         ("weight", f"{scene.weight * 1e-6:.5g} MN at g = {scene.gravity:g} m/s^2"),
         ("degrees of freedom", str(len(building.mass))),
         *((name, ", ".join(places)) for name, places in listed_nodes.items() if places),
-        ("frequencies on a fixed base", f"{vector(listed)}{more} Hz" if len(listed) else "none: a rigid body"),
+        ("frequencies on a fixed base", f"{vector_text(listed)} Hz{more}" if len(listed) else "none: a rigid body"),
     ]
     return Table("building", (), rows)
 
 
-def bearing_table(scene: BuildingScene) -> Table:
+def bearings_table(scene: BuildingScene) -> Table:
     """Kind, position and load at rest of every bearing."""
     kinds = grouped(scene.every_bearing)
     kind_of = {index: str(number) for number, members in enumerate(kinds, start=1) for index in members}
@@ -122,11 +124,14 @@ def _interfaces(scene: BuildingScene) -> Iterator[Table]:
 
 
 def _doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
-    """Doubts about interfaces and building; `_kinds` has the doubts about bearings."""
+    """Doubts about interfaces, the ground and the building; `_kinds` has the doubts about bearings."""
     notes = shared(
         Note(0.0, "value", *doubt, bearing=number)
         for number, (mount, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True), start=1)
-        for doubt in unsteady("interface.rotational_stiffness", *standing_below(mount, load)[:2])
+        for doubt in (
+            *unsteady("interface.rotational_stiffness", *standing_below(mount, load)[:2]),
+            *ground_doubts(mount),
+        )
     )
     yield from ((0, note.value, f"{scene.label(note.bearing - 1)}: {note.text}") for note in notes)
     yield from building_doubts(scene)

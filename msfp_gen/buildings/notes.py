@@ -10,21 +10,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from msfp_gen.buildings.bearing import BuildingBearing, standing_below
 from msfp_gen.buildings.building import Building
-from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.note import RISING, Note
 from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.plausibility import (
     LEAST_DAMPING,
+    NUMBER,
     OF_BEARING,
     OF_MOTION,
     OF_RUN,
     USUAL_DAMPING,
-    Check,
     Doubt,
     Reading,
     Subject,
+    UsualRange,
     doubtful_values,
     judged,
     ringing,
@@ -78,7 +80,7 @@ def shared(notes: Iterable[Note]) -> list[Note]:
     """The notes on values, with one note, of the first bearing, for all that have such a value at the same place."""
     alike: dict[tuple[int, str], list[Note]] = {}
     for note in notes:
-        words = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "", note.text.partition(":")[0])  # values may differ
+        words = NUMBER.sub("", re.split(r"(?<=\d): ", note.text)[0])  # values may differ, and the reasons after them
         alike.setdefault((note.surface, words), []).append(note)
     return [_with_others(group[0], group) for group in alike.values()]
 
@@ -106,13 +108,20 @@ def _has_rims(mount: BuildingBearing) -> bool:
     return (mount.effects or Auto()).rims is not False
 
 
+def ground_doubts(mount: BuildingBearing) -> Iterator[Doubt]:
+    """Doubts about the motion of the ground that a bearing has of its own."""
+    if mount.motion is not None:
+        yield from (doubt for doubt, _ in judged(OF_MOTION, mount.motion))
+
+
 def value_notes(mount: BuildingBearing, load: float) -> tuple[Note, ...]:
-    """Notes about doubtful values of a bearing and its interface. load: at rest [N]."""
+    """Notes about doubtful values of a bearing, its interface and its own ground. load: at rest [N]."""
     stiffness, needed, _ = standing_below(mount, load)
     doubts = (
         *doubtful_values(mount.bearing, load, _has_rims(mount)),
         *unread_values(mount.bearing, mount.effects or Auto()),
         *unsteady("interface.rotational_stiffness", stiffness, needed),
+        *ground_doubts(mount),
     )
     return tuple(Note(0.0, "value", *doubt) for doubt in doubts)
 
@@ -198,54 +207,54 @@ def _slowest(scene: BuildingScene) -> Iterator[Reading]:
 
 
 OF_BUILDING = (
-    Check(
+    UsualRange(
         _damping,
         (-np.inf, 0.2),
         "building.damping_ratio: the first mode on a fixed base has {value:.3g} of critical damping; is it a fraction, "
         "such as 0.05 for 5 per cent?",
         (-np.inf, 1.0),
     ),
-    Check(
+    UsualRange(
         _frequency,
         (0.05, np.inf),
         "building: the lowest frequency on a fixed base is {value:.3g} Hz; are stiffnesses in N/m and N m/rad, of "
         "torsion and rocking too?",
         (0.02, np.inf),
     ),
-    Check(
+    UsualRange(
         _floor_mass,
         (LIGHT, np.inf),
         "{path}.mass = {value:g} kg is {measure:.2g} of the mean of all floors; is it in kg, not in t?",
         (0.003, np.inf),
     ),
-    Check(
+    UsualRange(
         _gyration,
         (-np.inf, 1.0),
         "{path}.inertia: about E3 the radius of gyration is {value:.3g} m, the bearings are at most {widest:.3g} m "
         "apart; is it mass times radius squared [kg m^2]?",
         (-np.inf, 10.0),
     ),
-    Check(
+    UsualRange(
         _heights,
         (-np.inf, HEIGHT),
         "{path}.height = {value:g} m is unusually high; is it in m, not in mm?",
         (-np.inf, 100.0),
     ),
-    Check(
+    UsualRange(
         _storey_drifts,
         (-np.inf, 0.05),
         f"{{path}}.stiffness: under {SHARE:g} g the storey drifts by {{measure:.0%}} of its height; is it in N/m, not "
         "in kN/m?",
         (-np.inf, 0.3),
     ),
-    Check(
+    UsualRange(
         _sag,
         (-np.inf, 0.05),
         "building.bearing[{mount}].interface.vertical_stiffness = {value:g} N/m: the building settles by {measure:.3g} "
         "m at rest; is it in N/m, not in kN/m?",
         (-np.inf, 0.5),
     ),
-    Check(
+    UsualRange(
         _slowest,
         (0.05, np.inf),
         "building: on the vertical springs of its interfaces it rocks or heaves at {value:.3g} Hz; are their "
@@ -261,7 +270,8 @@ def _judged_building(scene: BuildingScene) -> Iterator[tuple[Doubt, bool]]:
     heaviest = int(np.argmax(scene.axial_loads))
     bearing, load = scene.bearings[heaviest].bearing, float(scene.axial_loads[heaviest])
     yield from judged(OF_RUN, Subject(bearing, load, limits=scene.limits))
-    yield from judged(OF_MOTION, scene.first_ground)
+    if any(mount.motion is None for mount in scene.bearings):
+        yield from judged(OF_MOTION, scene.motion)
     yield from judged(OF_BUILDING, scene)
 
 
@@ -272,6 +282,10 @@ def refusals(scene: BuildingScene) -> list[str]:
     kinds = {(mount.bearing, _has_rims(mount)): float(load) for mount, load in loads}
     for (bearing, rims), load in kinds.items():
         found += [text for (_, _, text), refused in judged(OF_BEARING, Subject(bearing, load, rims)) if refused]
+    own = {id(mount.motion): index for index, mount in reversed(list(enumerate(scene.bearings))) if mount.motion}
+    for index in sorted(own.values()):
+        judgements = judged(OF_MOTION, scene.bearings[index].motion)
+        found += [f"{scene.label(index)}: {text}" for (_, _, text), refused in judgements if refused]
     return found
 
 

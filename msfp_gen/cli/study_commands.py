@@ -11,7 +11,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from msfp_gen.cli.console import AsJson, Force, Progress, Workers, answer, interruptible, note, number, numbers, say
+from msfp_gen.cli.console import (
+    AsJson,
+    Force,
+    ShownProgress,
+    WorkersOption,
+    answer,
+    interruptible,
+    note,
+    note_doubts,
+    number,
+    numbers,
+    say,
+)
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.common.tables import TABLE_SUFFIXES
@@ -49,8 +61,8 @@ app.add_typer(
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a study.")]
 Measure = Annotated[str, typer.Option(metavar="COLUMN", help="The intensity measure.")]
 Demand = Annotated[str, typer.Option(metavar="COLUMN", help="The demand.")]
-Quantity = Annotated[str, typer.Option(metavar="COLUMN", help="The quantity.")]
-Statistic = Annotated[str, typer.Option(metavar="median|mean|max|min", help="Over the runs of one sample.")]
+QuantityColumn = Annotated[str, typer.Option(metavar="COLUMN", help="The quantity.")]
+StatisticWord = Annotated[str, typer.Option(metavar="median|mean|max|min", help="Over the runs of one sample.")]
 Level = Annotated[float, typer.Option(parser=number, metavar="SHARE", help="Confidence of intervals and bands.")]
 Where = Annotated[
     list[str] | None,
@@ -76,7 +88,7 @@ def run(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder of the study: part-*.parquet.")
     ] = None,
-    workers: Workers = None,
+    workers: WorkersOption = None,
     dask: Dask = None,
     shard: Annotated[
         str | None, typer.Option(metavar="I/N", help="Only every N-th chunk, from the I-th; for arrays of jobs.")
@@ -86,7 +98,9 @@ def run(
         str | None,
         typer.Option(metavar="COLUMN", help="Estimate a statistic of this quantity with few exact runs ([accuracy])."),
     ] = None,
-    statistic: Annotated[str | None, typer.Option(metavar="mean|probability", help="Statistic to estimate.")] = None,
+    statistic: Annotated[
+        str | None, typer.Option(metavar="mean|probability", help="StatisticWord to estimate.")
+    ] = None,
     threshold: Annotated[
         str | None, typer.Option(metavar="VALUE", help="Value to be reached, for a probability.")
     ] = None,
@@ -101,8 +115,9 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Run what is missing of a study, or estimate a statistic of it. Ctrl-C at any time: the same command continues."""
+    from msfp_gen.scene.plausibility import require_meant
     from msfp_gen.studies import run as module
-    from msfp_gen.studies.definition import example_text, load_study
+    from msfp_gen.studies.definition import example_text, load_study, study_doubts
 
     if example:
         say(example_text().rstrip("\n"))
@@ -112,20 +127,23 @@ def run(
     if output is None:
         raise InputError("--output is missing: give the folder of the study, such as -o out")
     part = (1, 1) if shard is None else module.parsed_shard(shard)
-    with Progress("records") as progress:
+    with ShownProgress("records") as progress:
         definition = load_study(source, progress)
     question = {
         "quantity": estimate, "statistic": statistic, "threshold": threshold, "target": target, "budget": budget,
     }  # fmt: skip
-    engine: dict[str, Any] = {"workers": workers, "dask": dask, "force": force}
-    if "accuracy" in definition.table or any(value is not None for value in question.values()):
-        if shard is not None:
-            raise InputError("--shard: the runs of an estimate depend on those before; give --workers or --dask")
+    estimated = "accuracy" in definition.table or any(value is not None for value in question.values())
+    if estimated and shard is not None:
+        raise InputError("--shard: the runs of an estimate depend on those before; give --workers or --dask")
+    if plot is not None and not estimated:
+        raise InputError("--plot: it draws an estimate; give --estimate too")
+    require_meant(*definition.ends, force=force)
+    note_doubts(study_doubts(definition))
+    engine: dict[str, Any] = {"workers": workers, "dask": dask, "force": True}  # values have been judged
+    if estimated:
         _estimate(definition, output, question | engine, plot, as_json)
         return
-    if plot is not None:
-        raise InputError("--plot: it draws an estimate; give --estimate too")
-    with interruptible(output), Progress(f"{definition.runs} runs") as progress:
+    with interruptible(output), ShownProgress(f"{definition.runs} runs") as progress:
         done = module.study(definition, output, shard=part, progress=progress, **engine)
     judged = any(column.name == "limits_exceeded" for column in definition.keep.columns)
     _report(done, output, as_json, judged)
@@ -244,8 +262,8 @@ def fragility(
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study tornado out --quantity peak_displacement --plot tornado.png")
 def tornado(
     folder: Folder,
-    quantity: Quantity,
-    statistic: Statistic = "median",
+    quantity: QuantityColumn,
+    statistic: StatisticWord = "median",
     plot: Plot = None,
     output: Output = None,
     as_json: AsJson = False,

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from io import BytesIO, StringIO
+from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,14 +18,14 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 TABLE_SUFFIXES = (".csv", ".parquet")
-Rows = list[tuple[str, str]]  # label and value
+LabelledValues = list[tuple[str, str]]  # label and value
 
 
 class Printed(ABC):
     """What `print` and a notebook show of an object that has a title and a few rows."""
 
     @abstractmethod
-    def printed_rows(self) -> tuple[str, Rows]:
+    def printed_rows(self) -> tuple[str, LabelledValues]:
         """Title, and label and value of each row."""
 
     def __repr__(self) -> str:
@@ -111,7 +112,16 @@ def yes(value: object) -> str:
     return "yes" if value else "-"
 
 
-def vector(values: Iterable[float], scale: float = 1.0) -> str:
+def decimal_text(value: float) -> str:
+    """A number with four significant digits and at most four decimals, without exponent."""
+    if value == 0:
+        return "0"
+    if abs(value) < 5e-5:
+        return "< 0.0001" if value > 0 else "> -0.0001"
+    return f"{value:.{min(max(3 - floor(log10(abs(value))), 0), 4)}f}"
+
+
+def vector_text(values: Iterable[float], scale: float = 1.0) -> str:
     """Components of a vector, each times `scale`, with four significant digits and separated by commas."""
     return ", ".join(f"{value * scale:.4g}" for value in values)
 

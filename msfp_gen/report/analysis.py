@@ -21,13 +21,24 @@ from msfp_gen.common.aliases import Progress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import G, Quantity, ruled_fields
-from msfp_gen.common.tables import Table
+from msfp_gen.common.tables import Table, decimal_text
 from msfp_gen.common.version import __version__
 from msfp_gen.figures.sheet import plot_sheet
-from msfp_gen.figures.style import CASE_COLOURS, COLOURS, FAINT, INK, THIN, distinct, headline, page, panels, plain
+from msfp_gen.figures.style import (
+    CASE_COLOURS,
+    COLOURS,
+    FAINT,
+    INK,
+    THIN,
+    distinct_colours,
+    headline,
+    page,
+    panels,
+    plain,
+)
 from msfp_gen.report.compared import compared_table
 from msfp_gen.report.frames import picture, render, write_page
-from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of, terms_shown
+from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, bearing_kind, terms_shown
 from msfp_gen.report.repeated import (
     Repeated,
     error_words,
@@ -38,6 +49,7 @@ from msfp_gen.report.repeated import (
     repeated,
     vertical_table,
 )
+from msfp_gen.results.verdict import LIMITS
 from msfp_gen.scene.explain import DOUBTFUL, explain
 from msfp_gen.scene.file.loader import bearing_from_table, bearing_tables, parsed_sheet
 from msfp_gen.scene.plausibility import runs_of_doubts
@@ -46,7 +58,13 @@ from msfp_gen.scene.scene_fields import Limits
 from msfp_gen.scene.sheet import Sheet
 from msfp_gen.studies.bounding import CASES, SuiteBounds, load_suite_bounds
 from msfp_gen.studies.bounding.runs import given_friction, shown_as
-from msfp_gen.studies.bounding.suite import plot_suite_bounds, suite_bound_tables, suite_doubts, suite_scenes
+from msfp_gen.studies.bounding.suite import (
+    plot_suite_bounds,
+    suite_bound_tables,
+    suite_doubts,
+    suite_scenes,
+    uplift_words,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -125,13 +143,14 @@ def analysis_html(
     study, bounds = load_suite_bounds(folder, leave_out)
     rows = read_study(folder)
     rows = rows[~rows["record"].isin(list(leave_out))]
-    scene = replace(study.scene(1), name=bounds.name)
+    first = len(CASES) * list(study.inputs.records).index(bounds.records[0]) + 1
+    scene = replace(study.scene(first + CASES.index("nominal")), name=bounds.name)
     runs = repeated(study, bounds, rows, progress) if loops else []
     found = [*_sections(study, bounds, rows, scene), *_runs_again(study, bounds, runs)]
-    found += _last_sections(study, rows, scene, runs)
+    found += _last_sections(study, bounds, rows, scene, runs)
     sections = [part for part in found if part.tables or part.figures or part.words]
     exceeded, failed = bool(bounds.exceeded), bool(bounds.failures or bounds.stopped)
-    device = ", ".join(dict.fromkeys(map(kind_of, scene.every_bearing)))
+    device = ", ".join(dict.fromkeys(map(bearing_kind, scene.every_bearing)))
     return render(
         "analysis.html.jinja",
         name=f"{bounds.name or 'unnamed scene'}: response history analysis at bounds",
@@ -211,7 +230,9 @@ def _runs_again(study: Study, bounds: SuiteBounds, runs: Sequence[Repeated]) -> 
         yield Section("Vertical component of the ground", (words,), [vertical_table(study, pairs)], figures)
 
 
-def _last_sections(study: Study, rows: Any, scene: Any, runs: Sequence[Repeated]) -> Iterator[Section]:
+def _last_sections(
+    study: Study, bounds: SuiteBounds, rows: Any, scene: Any, runs: Sequence[Repeated]
+) -> Iterator[Section]:
     again = next((run for run in runs if run.finer is not None), None)
     error = [*_energy(rows, *scene.energy_compared), *error_words(scene.solver, again)]
     yield Section("Energy and numerical error", error, [finer_table(study, again)] if again else [])
@@ -224,7 +245,11 @@ def _last_sections(study: Study, rows: Any, scene: Any, runs: Sequence[Repeated]
         kinds.add("sheet")
     yield Section("Which parts of the program were compared with what", (words,), [compared_table(kinds)])
     settings = (table for table in explain(scene) if not table.title.endswith(DOUBTFUL))  # of all runs: `doubt_table`
-    yield Section("Settings", (), [*settings, _files(study)])
+    words = (
+        f"The tables are of one run, {bounds.records[0]} at nominal friction. The other runs differ in the record, in "
+        "friction, and in the effects that follow from both."
+    )
+    yield Section("Settings", (words,), [*settings, _files(study)])
 
 
 def _spectra_section(rows: Any) -> Section:
@@ -294,7 +319,7 @@ def _inputs(study: Study, bounds: SuiteBounds, scene: Any) -> Table:
     factors, (target, _) = study.inputs.factors[study.axes[-1].paths[0]], _target(study)
     scales = [f"{name} × {float(study.inputs.records[name].get('scale', 1.0)):.4g}" for name in bounds.records]
     rows = [
-        ("bearings", "; ".join(f"{n} × {kind}" for kind, n in Counter(map(kind_of, scene.every_bearing)).items())),
+        ("bearings", "; ".join(f"{n} × {kind}" for kind, n in Counter(map(bearing_kind, scene.every_bearing)).items())),
         ("load at rest", f"{loads.sum():.4g} MN{f' on {len(loads)} bearings' if each else ''}{each}"),
         *_frictions(study),
         ("bounds", f"{factors.name}: {factors.description}".rstrip(": ")),
@@ -356,14 +381,17 @@ def limit_table(bounds: SuiteBounds, rows: Any) -> Table:
     """The largest share of every limit of the device by bound, with its record, value and place."""
     cases = {case: _reached(rows[rows["bounds"] == case]) for case in CASES}
     names = {key: None for found in cases.values() for key in found}
+    words = {limit.key: limit.name for limit in LIMITS}
     shown = []
     for name in names:
         shares = [cases[case].get(name) for case in CASES]
         worst = max((one for one in shares if one is not None), key=lambda one: one["share"])
-        cells = ("-" if one is None else f"{100 * one['share']:.3g} %" for one in shares)
+        cells = ("-" if one is None else f"{100 * one['share']:.3g}\N{NO-BREAK SPACE}%" for one in shares)
         unit, scale = shown_as(worst["unit"]) if worst["unit"] else ("", 1.0)
-        values = (f"{worst[key] * scale:.4g} {unit}".rstrip() for key in ("value", "allowed"))
-        shown.append((name.replace("_", " "), *cells, *values, worst["record"] if worst["share"] else "-"))
+        values = (f"{worst[key] * scale:.4g}\N{NO-BREAK SPACE}{unit}".rstrip() for key in ("value", "allowed"))
+        label = name.replace("_", " ")
+        label += f": {words[name]}" if words[name] != label else ""
+        shown.append((label, *cells, *values, worst["record"] if worst["share"] else "-"))
     columns = ("limit", *CASES, "largest", "allowed", "record")
     return Table("share of every limit of the device that the worst run reached (docs/results.md)", columns, shown)
 
@@ -459,7 +487,7 @@ def _plot_spectra(
     with page(9.5, 4.6) as figure:
         headline(figure, "Spectra of the scaled ground motions")
         row = panels(figure, f"horizontal, {component}", "vertical")
-        colours = distinct(len(horizontal))
+        colours = distinct_colours(len(horizontal))
         for axes, spectra in zip(row, (horizontal, vertical), strict=True):
             for (name, values), colour in zip(spectra.items(), colours, strict=True):
                 axes.plot(PERIODS, values, color=colour, linewidth=THIN, label=plain(name))
@@ -490,9 +518,9 @@ def _part_section(bounds: SuiteBounds, title: str, quantities: Sequence[str], wo
         rows = [
             (
                 one.part,
-                *("-" if v is None else f"{v * scale:.4g}" for v in (*one.means, *one.worst)),
+                *("-" if v is None else decimal_text(v * scale) for v in (*one.means, *one.worst)),
                 one.governs or "-",
-                one.record,
+                one.record or "-",
             )
             for one in reversed(parts)
         ]
@@ -534,23 +562,7 @@ def _rest(bounds: SuiteBounds) -> tuple[str, ...]:
     if "residual_displacement" in bounds.undefined:
         return ("No residual displacement is stated: some runs end while the structure still moves.",)
     found = [one for one in bounds.statistics if one.name == "residual_displacement"]
-    return tuple(f"Residual displacement: at most {1e3 * one.envelope[1]:.4g} mm, under {one.record}." for one in found)
-
-
-def uplift_words(bounds: SuiteBounds) -> tuple[str, ...]:
-    """Whether bearings lifted off, and their least axial force, in words; empty for the suite of one bearing."""
-    known = {one.name: one for one in bounds.statistics}
-    lifted = any(
-        one.envelope[1] > 0 for one in bounds.statistics if one.name.rpartition("_")[0] == "bearing_uplift_height"
-    )
-    least = known.get("minimum_load_ratio")
-    if least is None:  # one bearing: the table of limits has its uplift height
-        return ()
-    ratio = f"{least.envelope[1]:.3g} of the load at rest, under {least.record}"
-    if lifted:
-        return (f"Bearings lifted off: the least axial force was {ratio}.",)
-    until = " before it ended" if not bounds.ended.all() else ""
-    return (f"No bearing lifted off in any run{until}: the least axial force of a bearing was {ratio}.",)
+    return tuple(f"Residual displacement: at most {1e3 * one.envelope[1]:.4g} mm{one.under}." for one in found)
 
 
 def _energy(rows: Any, compared: str, scale: str) -> list[str]:

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 COMPARED = (
     "peak_displacement", "peak_force", "peak_overturning_moment", "peak_floor_acceleration", "peak_corner_acceleration",
     "peak_vertical_acceleration", "peak_drift_ratio", "maximum_load_ratio", "minimum_load_ratio",
-    "maximum_normal_force_1", "minimum_normal_force_1",
+    "maximum_normal_force_1",
 )  # fmt: skip
 BESIDE = 4.0  # time before and after the largest base shear that is drawn [s]
 LOADED = 0.1  # of the load at rest, least sum of the axial forces to which a shear is compared
@@ -92,7 +92,7 @@ def repeated(study: Study, bounds: SuiteBounds, rows: Any, progress: Progress | 
     most = min(tightened.max_steps, int(MOST_STEPS * chosen[tight]["steps"]))
     finer = replace(scenes[tight], solver=replace(tightened, max_steps=most))
     with closing(completed_runs([*scenes, *level, finer], progress=progress)) as runs:
-        ended = {index: result for index, result in runs if getattr(result, "status", "") == "ok"}
+        ended = {index: result for index, result in runs if result.status == "ok"}
     without = {index: ended.get(len(scenes) + place) for place, index in enumerate(moved)}
     found = []
     for index, row in enumerate(chosen):

@@ -203,7 +203,7 @@ class SurfaceDemand:
         heat: its integral over time [J/m^2]; None if A or v is not known.
         contact_area: A = pi r^2, with r the radius of the sliding patch, else the rim radius of the slider [m^2]; None
             if the bearing has neither.
-        maximum_uplift: largest opening of the surface [m]; None in a model without uplift.
+        maximum_uplift: largest opening of the surface [m]; None where no model of the run had uplift.
     """
 
     surface: int
@@ -223,7 +223,8 @@ def surface_demands(one: Result, rows: slice | None = None) -> tuple[SurfaceDema
     gap, lift = (values[rows] for values in (history.gap, history.lift))
     least_gap = extremes.gap if whole else gap.min(axis=0)
     most_lift = extremes.lift if whole and extremes.lift is not None else lift.max(axis=0)
-    has_uplift = one.effects.uplift or bool(history.lift.any())  # a monitor may add uplift during the run
+    recorded = one.recorded_extremes  # a monitor may have added uplift during the run
+    has_uplift = one.effects.uplift or history.lift.any() or (recorded is not None and recorded.lift is not None)
     slips = _slips(one, rows, whole) if isinstance(one.history, History) else None
     return tuple(
         SurfaceDemand(

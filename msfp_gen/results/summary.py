@@ -17,6 +17,7 @@ from msfp_gen.results.history import BearingRows, History, by_axis
 from msfp_gen.results.sliding import SHARE, merged, open_times, slip_shares
 from msfp_gen.scene.bearing import Surface
 from msfp_gen.scene.parameters import Parameter
+from msfp_gen.scene.top import MassTop
 
 if TYPE_CHECKING:
     from msfp_gen.results.result import AnyResult, Result
@@ -120,6 +121,8 @@ def summarise(result: Result) -> dict[str, Any]:
         peak_force_ratio: peak radial force over axial load [-]; None without a constant load.
         peak_sliding, minimum_gap: [m]. capacity_used: sliding over capacity, 1 where a slider meets its rim [-].
         minimum_normal_force, maximum_normal_force: [N].
+        minimum_load_ratio: least normal force of any surface over the load at rest, 0 where one opens [-]; None without
+            a load at rest.
         friction: coefficients at the surfaces. Of a run of one pendulum in place of the stack no key of surfaces is
             given. friction_at_pivot: the same as data sheets give them
             (`Bearing.friction_at_pivot`); None where there are none [-].
@@ -200,6 +203,8 @@ def summary_of_bearing(one: Result) -> dict[str, Any]:
     }
     if one.one_pendulum:
         return summary
+    if one.mounting is None:  # otherwise the axial force of the bearing counts
+        summary["minimum_load_ratio"] = _least_ratio(one)
     times = {key: extremes.times[name].tolist() for name, key in OF_SURFACES.items() if recorded[key] is not None}
     summary |= {
         "times": summary["times"] | times,
@@ -211,6 +216,14 @@ def summary_of_bearing(one: Result) -> dict[str, Any]:
         "rims_met": rims_met(one),
     }
     return summary | ({"transitions": transitions(one)} if is_monotonic(one) else {})
+
+
+def _least_ratio(one: Result) -> float | None:
+    """Least normal force of any surface of a bearing alone over the load at rest; None without one."""
+    (load,), lift = one.scene.loads_at_rest, one.extremes.lift
+    opened = lift is not None and lift.max() > 0
+    least = 0.0 if opened else float(one.extremes.least_normal.min())
+    return max(least, 0.0) / load if load > 0 else None
 
 
 def uplift_of(one: Result) -> dict[str, Any]:
@@ -362,7 +375,7 @@ def _ratio_slope(result: Result, parameter: Parameter, slope: float) -> float | 
 def _load_slope(result: Result, parameter: Parameter) -> float:
     """Derivative of `axial_load` with respect to a parameter."""
     scene, name = result.alone.scene, parameter.path
-    gravity, mass = scene.bearing.gravity, float(getattr(scene.top, "mass", 0.0)) if scene.top.kind == "mass" else 0.0
+    gravity, mass = scene.bearing.gravity, scene.top.mass if isinstance(scene.top, MassTop) else 0.0
     slopes = {"top.axial_load": 1.0, "top.force[2]": -1.0, "top.mass": gravity, "bearing.gravity": mass}
     if name == "load.scale" and scene.load is not None:
         return -float(np.asarray(scene.load.coefficients)[0, 2, 0])
@@ -406,7 +419,7 @@ SURFACE_COLUMNS: dict[str, tuple[str, float, str]] = {
 }
 
 
-def surface_table(summary: Mapping[str, Any], surfaces: Sequence[Surface]) -> Table:
+def surface_peaks_table(summary: Mapping[str, Any], surfaces: Sequence[Surface]) -> Table:
     """Peaks of the surfaces of a bearing."""
     values: dict[str, Any] = {
         **summary,

@@ -24,11 +24,12 @@ from msfp_gen.common.fields import Choice, Quantity, check_fields, ruled_fields
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Files, expecting, is_input, recording
 from msfp_gen.results.dataset import columns as columns_of_system
-from msfp_gen.results.quantities import Source, quantities
+from msfp_gen.results.quantities import ColumnSource, quantities
 from msfp_gen.scene.file.catalogue import check_whole_numbers, known_keys, parsed
 from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.scene.file.loader import Suite, load_suite, scene_table, suite_from_table, toml_file
 from msfp_gen.scene.file.source import with_absolute_paths
+from msfp_gen.scene.plausibility import doubts, target_doubts
 from msfp_gen.scene.system import System
 from msfp_gen.studies.axes import (
     INTENSITY,
@@ -49,7 +50,8 @@ if TYPE_CHECKING:
 
 MOST_RUNS = 100_000_000
 
-TRIED = 1000  # numbers of one axis that are tried before the first run, at least; texts and tables are all tried
+TRIED = 1000  # numbers of one axis that are tried before the first run, at most; texts and tables are all tried
+DOUBTED = 25  # numbers of one axis about which doubts are stated, at most; texts and tables are all judged
 PARTS = 64  # parts of a study, at least, unless these would have fewer than LEAST runs
 LEAST, MOST = 8, 256  # runs of a chunk where the study file does not give `chunk`
 OF_RECORDS = ("record", "scale")  # names of axes that [records] reserves
@@ -245,7 +247,7 @@ def check_study(study: Study) -> Study:
         for axis in study.axes:
             with prefixed(f"axes.{axis.name}."):
                 _check_axis(axis, factory, bool(study.inputs.records))
-        sources: dict[str, Source] = {}
+        sources: dict[str, ColumnSource] = {}
         columns: dict[str, None] = {}
         first, base, opened = {}, "", {}
         for place, scene, files in _tried_scenes(study, factory):  # one scene in memory at a time: motions are long
@@ -266,6 +268,26 @@ def check_study(study: Study) -> Study:
     return study
 
 
+def study_doubts(study: Study) -> list[tuple[str, list[str]]]:
+    """The doubts about the values of a study: of its first run, and of this run with other values of one axis.
+
+    Returns pairs of a name, "run 1" or an axis with its value, and the texts; of the target of the suite in each.
+    """
+    target = target_doubts(study.table.get("records", {}).get("target"))
+    with expecting(study.files):
+        tried = _tried_scenes(study, SceneFactory(study.inputs), DOUBTED)
+        return [(_tried_name(study, place), [*target, *doubts(scene)]) for place, scene, _ in tried]
+
+
+def _tried_name(study: Study, place: tuple[int, int] | None) -> str:
+    """A tried scene in messages. place: indices of the axis and of its value, None of the first run."""
+    if place is None:
+        return "run 1"
+    axis = study.axes[place[0]]
+    value = axis.labels[place[1]] if axis.values is not None else ("least", "largest")[place[1]]
+    return f"{axis.name} {value:.4g}" if isinstance(value, float) else f"{axis.name} {value}"
+
+
 def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:
     """Raise InputError where an axis names a field or a surface that the base scene does not let it change."""
     for path in axis.paths if axis.change in ("sets", "multiplies") else ():
@@ -282,9 +304,12 @@ def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:
             raise InputError(f"surfaces has {surface}: this bearing has surfaces 1 to {count}")
 
 
-def _tried_scenes(study: Study, factory: SceneFactory) -> Iterator[tuple[tuple[int, int] | None, System, Files]]:
+def _tried_scenes(
+    study: Study, factory: SceneFactory, most: int = TRIED
+) -> Iterator[tuple[tuple[int, int] | None, System, Files]]:
     """The scene of the first run, and for each tried value of an axis the scene with this value in the first run."""
     # Yields (index of the axis, index of the value), None for the first run; the scene; and the files that it opened.
+    # most: numbers of one axis.
     (base, _), *_ = study.task(0).rows(study.axes)
     named = ", ".join(f"{axis.name} = {value!r:.40}" for axis, value in zip(study.axes, base, strict=True))
     yield None, *_scene_and_files(factory, base, f"run 1 ({named})")
@@ -294,8 +319,10 @@ def _tried_scenes(study: Study, factory: SceneFactory) -> Iterator[tuple[tuple[i
             column = next(drawn)
             tried: list[tuple[int, Any]] = list(enumerate(sorted({float(column.min()), float(column.max())})))
         else:
+            count = len(axis.values)
             numeric = all(isinstance(value, int | float) for value in axis.values)
-            tried = list(enumerate(axis.values))[:: max(1, len(axis.values) // TRIED) if numeric else 1]
+            places = np.linspace(0, count - 1, min(count, most) if numeric else count).round().astype(int)
+            tried = [(place, axis.values[place]) for place in places.tolist()]
         for place, value in tried:
             changed = (*base[:index], value, *base[index + 1 :])
             yield (index, place), *_scene_and_files(factory, changed, f"axes.{axis.name}: value {value!r}")

@@ -9,17 +9,26 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
+import numpy as np
 import pandas as pd
 import pytest
 from support import hearing, scene_of
 from support.study_tables import cheap_study, rows_of
 
+from msfp_gen import changed_scene
 from msfp_gen.cli import main
 from msfp_gen.scene.file.loader import dumps, scene_text
 from msfp_gen.studies import load_study
+
+MOTIONS = [
+    {"name": f"CLC-{number}", "bundled": "ridgecrest-2019-ci-clc", "components": ["E1"], "duration": 8.0}
+    for number in (1, 2)
+]
 
 
 def written(folder: Path, **changes: Any) -> Path:
@@ -60,6 +69,34 @@ def test_a_study_runs_continues_and_says_how_far_it_is(tmp_path: Any, capsys: py
     assert main(["study", "status", str(out), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["done"], found["failed"], found["running"], found["chunks"]) == (12, 0, False, 3)
+
+
+def test_doubtful_values_of_a_study_are_printed_before_its_runs(tmp_path: Any, capsys: Any, monkeypatch: Any) -> None:
+    """A line for all runs, and a line for all values of an axis with a doubt of one kind; also of an equivalent."""
+    calls: list[Any] = []
+    monkeypatch.setattr("msfp_gen.studies.run.study", lambda *_, **options: calls.append(options) or Mock())
+    monkeypatch.setattr("msfp_gen.cli.study_commands._report", lambda *_: None)
+    table: dict[str, Any] = {
+        "scene": tomllib.loads(scene_text(changed_scene("ridgecrest-clc", {"bearing.gravity": 8.0}))),
+        "records": {"motions": MOTIONS, "scales": [1.0, 8.0, 9.0]},
+        "axes": {"friction": {"multiplies": "bearing.friction", "values": np.linspace(1, 40, 100).tolist()}},
+    }
+    (tmp_path / "study.toml").write_text(dumps(table), encoding="utf-8")
+    given = ["study", str(tmp_path / "study.toml"), "-o", str(tmp_path / "out")]
+    assert main(given) == 0 and calls[0]["force"]
+    gravity, scale, *friction = capsys.readouterr().err.splitlines()
+    assert gravity.startswith("bearing.gravity = 8 m/s^2")
+    assert scale.startswith("scale 8: motion.scale = 8 ") and scale.endswith("; likewise scale 9")
+    assert [line.partition(" = ")[0] for line in friction] == [
+        f"friction {first}: bearing.surfaces[{index}].friction"
+        for first, index in (("4.152", 0), ("4.152", 3), ("9.273", 1), ("9.273", 2))
+    ]
+    del table["axes"]
+    table["scene"]["fidelity"] = "equivalent"
+    (tmp_path / "study.toml").write_text(dumps(table), encoding="utf-8")
+    assert main(given) == 0
+    (scale,) = capsys.readouterr().err.splitlines()
+    assert scale.startswith("scale 8: motion.scale = 8 ")
 
 
 def test_an_estimate_is_printed_and_kept_as_json(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:

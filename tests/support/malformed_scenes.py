@@ -22,6 +22,7 @@ ROWS = [
     ("bearing.bodies.0.colour", 4.4, ("bearing.bodies[0].colour (body 2): unknown key", "mass")),
     ("bearing.layout.k", 4, ("bearing.layout.k: unknown key", "n, m, p")),
     ("motion.amplitud", 0.1, ("motion.amplitud: unknown key", "'amplitude'")),
+    ("motion.held", 20.0, ("motion.held: unknown key", "did you mean 'hold'?")),
     ("top.stifness", 1e8, ("top.stifness: unknown key", "'stiffness'")),
     ("effects.rim", True, ("effects.rim: unknown key", "'rims'")),
     ("solver.tol", 1e-4, ("solver.tol: unknown key", "'rtol'")),

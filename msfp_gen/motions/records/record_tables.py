@@ -35,7 +35,7 @@ def suite_tables(names: Sequence[str], motions: Sequence[Motion], scaled: Scaled
         row = (f"{float(motion.metadata['scale']):.4g}", f"{motion.duration:.4g}", *(f"{peak:.4f}" for peak in peaks))
         rows.append((name, *row))
     columns = ("record", "factor", "duration [s]", *(f"PGA {axis} [g]" for axis in COMPONENTS))
-    tables = [Table(f"suite of {len(rows)}", columns, rows)]
+    tables = [Table(f"suite of {len(rows)} record{'s' * (len(rows) > 1)}", columns, rows)]
     if scaled is None:
         return tables
     ratio, at = scaled.mean / scaled.target, np.linspace(0, len(scaled.period) - 1, min(9, len(scaled.period)))

@@ -21,9 +21,9 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.inputs import expecting
 from msfp_gen.common.output import check_output
-from msfp_gen.common.tables import Table, write_columns
-from msfp_gen.figures.style import INK, distinct, headline, page, plain
-from msfp_gen.results.quantities import MOVING, Source
+from msfp_gen.common.tables import Table, decimal_text, write_columns
+from msfp_gen.figures.style import INK, distinct_colours, headline, page, plain
+from msfp_gen.results.quantities import MOVING, ColumnSource
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.scene.plausibility import doubts, require_meant, target_doubts
 from msfp_gen.studies.batch import ENDED
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.system import System
     from msfp_gen.studies.definition import Study
 
-Run = tuple[str, str]  # names of a record and of a case
+RunKey = tuple[str, str]  # names of a record and of a case
 
 # Quantities of the figure, where the runs have them.
 DRAWN = ("peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "capacity_left")
@@ -54,8 +54,9 @@ class Statistic:
 
     name: column of the study. part: name of its bearing, storey, floor or surface; "" for the bearing or building as a
     whole. extreme: whether the largest or the least value is the worst. means: by case, over the runs that ended [SI];
-    None where a run that ended has no value. worst: by case, of all runs, also of those that ended early [SI]. governs:
-    case with the worst mean; "" unless all means are of the same records. record: record with the worst value of all.
+    None where a run that ended has no value. worst: by case, of all runs, also of those that ended early [SI].
+    comparable: whether all means are of the same records. governs: case with the worst mean; "" unless they are, or
+    where all are equal. record: record with the worst value of all; "" where all values are equal.
     """
 
     name: str
@@ -64,14 +65,20 @@ class Statistic:
     extreme: Literal["most", "least", ""]
     means: tuple[float | None, ...]
     worst: tuple[float | None, ...]
+    comparable: bool
     governs: str
     record: str
+
+    @property
+    def under(self) -> str:
+        """The record with the worst value, as the end of a sentence."""
+        return f", under {self.record}" if self.record else ""
 
     @property
     def envelope(self) -> tuple[float | None, float]:
         """The worst mean, None unless all means are of the same records, and the worst value over the cases [SI]."""
         worst_of = WORST[self.extreme]
-        mean = float(worst_of([m for m in self.means if m is not None])) if self.governs else None
+        mean = float(worst_of([m for m in self.means if m is not None])) if self.comparable else None
         return mean, float(worst_of([value for value in self.worst if value is not None]))
 
 
@@ -96,11 +103,11 @@ class SuiteBounds:
     factors: str
     records: tuple[str, ...]
     left_out: tuple[str, ...]
-    sources: Mapping[str, Source]
+    sources: Mapping[str, ColumnSource]
     values: Mapping[str, Array]
-    failures: Mapping[Run, str]
-    exceeded: Mapping[Run, str]
-    stopped: Mapping[Run, float]
+    failures: Mapping[RunKey, str]
+    exceeded: Mapping[RunKey, str]
+    stopped: Mapping[RunKey, float]
 
     @cached_property
     def ended(self) -> Any:
@@ -124,10 +131,12 @@ class SuiteBounds:
         worst_of = WORST[quantity.governs]
         means = self.means(name)
         worst = [None if np.isnan(column).all() else float(worst_of(column)) for column in values.T]
-        same = all((column == self.ended[:, 0]).all() for column in self.ended.T)
-        case = CASES[means.index(worst_of(means))] if same and None not in means else ""
-        record = self.records[int(np.argwhere(values == worst_of(values))[0][0])]
-        return Statistic(name, part, quantity.unit, quantity.governs, means, tuple(worst), case, record)
+        comparable = None not in means and all((column == self.ended[:, 0]).all() for column in self.ended.T)
+        case = CASES[means.index(worst_of(means))] if comparable and len(set(means)) > 1 else ""
+        known = values[~np.isnan(values)]
+        place = int(np.argwhere(values == worst_of(values))[0][0])
+        record = self.records[place] if len(self.records) == 1 or np.ptp(known) else ""
+        return Statistic(name, part, quantity.unit, quantity.governs, means, tuple(worst), comparable, case, record)
 
     @property
     def undefined(self) -> dict[str, str]:
@@ -323,7 +332,7 @@ def _from_rows(study: Study, folder: Path, leave_out: Collection[str]) -> SuiteB
 
     rows = read_study(folder)
     rows = rows[~rows["record"].isin(list(leave_out))]
-    runs: list[Run] = list(zip(rows["record"], rows["bounds"], strict=True))
+    runs: list[RunKey] = list(zip(rows["record"], rows["bounds"], strict=True))
     early = rows["status"].to_numpy() != "ok"
     sources = {name: source for name, source in study.keep.sources if name in rows and source.quantity.governs}
     values = {}
@@ -332,7 +341,7 @@ def _from_rows(study: Study, folder: Path, leave_out: Collection[str]) -> SuiteB
         until_then = source.quantity.side == source.quantity.governs  # more of the run can only make it worse
         values[name] = (column if until_then else np.where(early, np.nan, column)).reshape(-1, len(CASES))
 
-    def chosen(column: str, which: Iterable[bool]) -> dict[Run, Any]:
+    def chosen(column: str, which: Iterable[bool]) -> dict[RunKey, Any]:
         return {run: value for run, value, is_one in zip(runs, rows[column], which, strict=True) if is_one}
 
     failures = chosen("message", ~rows["status"].isin(ENDED))
@@ -363,9 +372,9 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
         if not statistic.part:
             unit, scale = shown_as(statistic.unit)
             numbers = (*statistic.means, *statistic.worst)
-            cells = ["-" if value is None else f"{value * scale:.4g}" for value in numbers]
+            cells = ["-" if value is None else decimal_text(value * scale) for value in numbers]
             name = f"{bounds.sources[statistic.name].words(statistic.name)} [{unit}]"
-            rows.append((name, *cells, statistic.governs or "-", statistic.record))
+            rows.append((name, *cells, statistic.governs or "-", statistic.record or "-"))
     marks = {case: "*" if case in bounds.incomplete else "" for case in CASES}
     columns = (
         "",
@@ -392,6 +401,34 @@ def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
         Table("runs that failed; of several for the same reason the first message", (), failed),
     ]
     return [table for table in tables if table.rows]
+
+
+def uplift_words(bounds: SuiteBounds) -> tuple[str, ...]:
+    """Whether bearings opened, by how much, and else how far their force fell, in words; empty where it is unknown.
+
+    Of one bearing also in how many runs uplift was simulated.
+    """
+    known = {one.name: one for one in bounds.statistics}
+    least = known.get("minimum_load_ratio")
+    if least is None:
+        return ()
+    alone = "maximum_uplift" in bounds.sources
+    heights = bounds.values["maximum_uplift"] if alone else np.zeros(0)
+    simulated = int((~np.isnan(heights)).sum())
+    force = "normal force of a surface" if alone else "axial force of a bearing"
+    fell = f"the least {force} was {least.envelope[1]:.3g} of the load at rest{least.under}"
+    where = "every run" if simulated == heights.size else f"{simulated} of {heights.size} runs"
+    runs = f" Uplift was simulated in {where}." if alone else ""
+    if alone and not simulated:
+        return (f"No run simulated uplift, which begins where a normal force falls to zero: {fell}.",)
+    names = ("maximum_uplift", "bearing_uplift_height")
+    opened = [one for one in known.values() if (one.name.rpartition("_")[0] if one.part else one.name) in names]
+    highest = max(opened, key=lambda one: one.envelope[1], default=None)
+    if highest is not None and (height := highest.envelope[1]) > 0:
+        which = "The bearing" if alone else f"Bearings opened, {highest.part} the farthest: a surface"
+        return (f"{which} opened by at most {1e3 * height:.3g} mm{highest.under}.{runs}",)
+    until = " before it ended" if not bounds.ended.all() else ""
+    return (f"No bearing opened in any run{until}: {fell}.{runs}",)
 
 
 def _counted(bounds: SuiteBounds) -> str:
@@ -421,7 +458,7 @@ def _words(message: str) -> str:
     return re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "", message)
 
 
-def _named(runs: Iterable[Run]) -> str:
+def _named(runs: Iterable[RunKey]) -> str:
     """Runs by the names of their records, each with its cases."""
     cases: dict[str, list[str]] = {}
     for record, case in runs:
@@ -476,7 +513,7 @@ def plot_suite_bounds(bounds: SuiteBounds, path: str | Path | None = None) -> Fi
     A cross marks a run that did not reach its end. Raises InputError for a path that cannot be written.
     """
     plotted = [name for name in DRAWN if name in bounds.values and not np.isnan(bounds.values[name]).all()]
-    colours = distinct(len(bounds.records))
+    colours = distinct_colours(len(bounds.records))
     rows = 1 + len(plotted) // IN_ROW
     with page(9.5, 0.6 + 2.7 * rows, path, "suite") as figure:
         headline(figure, f"{bounds.name or 'unnamed scene'}: {_counted(bounds)} at bounds by {bounds.factors}")

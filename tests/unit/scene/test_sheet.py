@@ -11,7 +11,9 @@ import pytest
 
 from msfp_gen import Bearing, InputError, load_scene, presets
 from msfp_gen.design.effective import characteristic, effective, published_backbone, regimes
+from msfp_gen.design.equivalent import DAMPING, equivalent
 from msfp_gen.results.geometry import outline
+from msfp_gen.scene.fidelity import Backbone
 from msfp_gen.scene.file.loader import bearing_from_table, complete_bearing, scene_from_table
 from msfp_gen.scene.sheet import Sheet, revolved
 from msfp_gen.studies.bounding import SHEET, bounded_scenes, factors_of
@@ -104,15 +106,74 @@ def test_devices_of_opensees(
             slider_diameter=sliders, axial_load=1e6,
         )
     )  # fmt: skip
+    check_regimes(backbone, lengths, friction)
+    assert backbone.capacity == pytest.approx(2 * sum(limits))
+
+
+def check_regimes(backbone: Backbone, lengths: tuple[float, float], friction: tuple[float, ...]) -> None:
+    """The first three regimes of a symmetric triple pendulum as Fenz and Constantinou (2008) have them."""
     (outer, inner), (mu1, mu2, _, mu4) = lengths, friction
     first = 2 * (mu1 - mu2) * inner
     second = first + (mu4 - mu1) * (outer + inner)
     drawn = regimes(backbone)
     assert drawn[1][0] == pytest.approx(first) and drawn[2][0] == pytest.approx(second)
     assert [k for *_, k in drawn[:3]] == pytest.approx([1 / (2 * inner), 1 / (outer + inner), 1 / (2 * outer)])
-    assert backbone.capacity == pytest.approx(2 * sum(limits))
     mean = (mu1 + mu4) / 2 - ((mu1 + mu4) / 2 - mu2) * inner / outer
     assert characteristic(backbone) == pytest.approx((mean, 2 * outer))
+
+
+def test_example_of_the_element_of_becker() -> None:
+    """T. Becker (2011), element TFP in the manual of OpenSees: radii, heights and all diameters, in inches.
+
+    From it u* = 2 (0.09 - 0.02) 9 = 1.26 in and u** = 1.26 + (0.12 - 0.09) (83.5 + 9) = 4.035 in. The element takes
+    half the difference of the diameters, 15.75 and 2 in, in place of the arc between them.
+    """
+    inch, friction = 0.0254, (0.09, 0.02, 0.02, 0.12)
+    data = Sheet(
+        device="triple", radius=(88 * inch, 12 * inch), height=(4.5 * inch, 3 * inch), friction=friction,
+        slider_diameter=(12.5 * inch, 8 * inch), dish_diameter=(44 * inch, 12 * inch), axial_load=45 * 4448.22,
+    )  # fmt: skip
+    assert data.capacity is not None
+    arcs = np.array(data.capacity[:2]) / inch
+    assert np.all(arcs > [15.75, 2.0]) and arcs == pytest.approx([15.75, 2.0], rel=0.11)
+    backbone = published_backbone(Bearing.of_values(data.values))
+    check_regimes(backbone, (83.5 * inch, 9 * inch), friction)
+    assert [a / inch for a, *_ in regimes(backbone)[1:3]] == pytest.approx([1.26, 4.035])
+
+
+@pytest.mark.parametrize(
+    ("intensity", "period", "damping", "lengths", "friction", "third"),
+    [
+        (1.021104444, 3.330817955, 0.149402038, (71.8984954, 26.62907237), (0.070898215, 0.029800633), 3.832976957),
+        (1.029922353, 2.758190231, 0.111117955, (48.05609135, 32.03739424), (0.153073523, 0.025768391), 3.133650299),
+        (1.252042166, 2.542428793, 0.152960955, (42.02422546, 20.01153593), (0.114600733, 0.062113565), 2.930395011),
+    ],
+)
+def test_designs_of_a_database(
+    intensity: float,
+    period: float,
+    damping: float,
+    lengths: tuple[float, float],
+    friction: tuple[float, float],
+    third: float,
+) -> None:
+    """H. Pham (University of California, Berkeley), tfp-database: sessionOut/sessionSummary.csv, the first three rows.
+
+    Each row is a triple pendulum that was designed for T_M and zeta_M under S_a = S_1/T, with B of ASCE 7: its columns
+    are S1 [g], Tm [s], zetaM, R2 and R1 [in], mu2 and mu1, and T2 [s], the period of the third regime. The design
+    counts a yield displacement of 0.01 in, by which its damping is up to 0.06 % smaller.
+    """
+    inch, gravity = 0.0254, 386.4 * 0.0254
+    backbone = published_backbone(
+        Bearing.from_sheet(
+            device="triple", effective_radius=[L * inch for L in lengths], height=[0.35, 0.2], friction=friction,
+            capacity=[18 * inch, 8 * inch], slider_diameter=[0.3, 0.2], axial_load=1e6,
+        )
+    )  # fmt: skip
+    assert 2 * pi / sqrt(gravity * regimes(backbone)[1][3]) == pytest.approx(third, rel=1e-9)
+    spectrum = [(T, intensity * gravity / T) for T in (0.5, 10.0)]
+    found = equivalent(backbone, spectrum, DAMPING["asce7"][0], gravity).at
+    assert found.period == pytest.approx(period, rel=1e-4) and found.damping == pytest.approx(damping, rel=1e-3)
 
 
 def test_specimen_of_a_hybrid_simulation() -> None:
@@ -175,6 +236,24 @@ def test_isolators_of_a_published_plant() -> None:
     assert found.damping == pytest.approx(2 / pi * 0.06 / 0.26)
     pressure = 10.75e6 / (pi * 0.2**2)
     assert pressure == pytest.approx(85.5e6, rel=1e-3)
+
+
+def test_isolator_of_the_reports_on_nuclear_plants() -> None:
+    """M. Kumar (2015), element FPBearingPTV in the manual of OpenSees: R = 2.2352 m, mu = 0.06, 50 MPa, r = 0.2 m.
+
+    The manual of MASTODON (Idaho National Laboratory) has its axial load, 6285710 N, and its mass, 640745 kg. The two
+    forces are of its reference solution, gold/fp_isolator_shear_P_out.csv, at 1.005 s and 1.5 s.
+    """
+    load = 6285710.0
+    assert load == pytest.approx(50e6 * pi * 0.2**2, rel=5e-4) and load / 9.81 == pytest.approx(640745, abs=1)
+    bearing = Bearing.from_sheet(
+        device="single", effective_radius=[2.2352], height=[0.0], friction=[0.06], slider_diameter=[0.4],
+        capacity=[0.5], yield_displacement=1e-3, axial_load=load,
+    )  # fmt: skip
+    backbone = published_backbone(bearing)
+    for displacement, force in ((1.57063525e-3, 381505.41), (0.1004171505, 659761.70)):
+        assert effective(backbone, displacement, 9.81).force * load == pytest.approx(force, rel=5e-4)
+    assert 2 * pi / sqrt(9.81 * regimes(backbone)[0][3]) == pytest.approx(3.0, abs=1e-3)
 
 
 def test_dishes_that_would_meet_are_refused() -> None:

@@ -35,22 +35,25 @@ from msfp_gen import (
     study,
 )
 from msfp_gen.cli import main
-from msfp_gen.figures.style import COLOURS, distinct
-from msfp_gen.results.quantities import quantities
+from msfp_gen.figures.style import COLOURS, distinct_colours
+from msfp_gen.results.quantities import ColumnSource, RunQuantity, quantities
 from msfp_gen.scene.file.loader import scene_text, toml_table
 from msfp_gen.studies import read_study
 from msfp_gen.studies.bounding import (
     CASES,
     Bounds,
+    SuiteBounds,
     bound,
     bound_suite,
     bounded_scenes,
     factor_tables,
     load_factors,
+    load_suite_bounds,
     suite_study,
 )
 from msfp_gen.studies.bounding.factors import _read
 from msfp_gen.studies.bounding.runs import _scaled, bounded_scene, bounding_tables, plot_bounds
+from msfp_gen.studies.bounding.suite import suite_bound_tables, uplift_words
 from msfp_gen.studies.workers import Workers
 
 ASCE = ((1 + 0.75 * 0) * 0.7 * 0.85, (1 + 0.75 * (1.3 * 1.2 - 1)) * 1.3 * 1.15)
@@ -413,6 +416,34 @@ def test_a_suite_at_bounds_is_that_of_its_records(tmp_path: Path, capsys: Any) -
         assert float(row["envelope of worst"]) == pick(map(pick, by_case.values()))
         assert row["governs"] == pick(means, key=means.__getitem__)
     assert rows["capacity left of surface 2"]["of"] == "surface 2" and rows["peak displacement"]["of"] == ""
+    check_uplift_words(load_suite_bounds(out)[1], rows["least normal force over the load at rest"], printed)
+
+
+def check_uplift_words(found: SuiteBounds, row: dict[str, str], printed: str) -> None:
+    """How far the normal force fell, and in how many runs uplift was simulated; also of runs that simulate it."""
+    assert 0 < float(row["envelope of worst"]) < 1  # of runs with the vertical component
+    fell = f"{float(row['envelope of worst']):.3g} of the load at rest, under {row['worst record']}"
+    (words,) = uplift_words(found)
+    assert fell in words and words in printed and words.startswith("No run simulated uplift")
+    heights = np.full_like(found.values["maximum_uplift"], np.nan)
+    closed = f"No bearing opened in any run: the least normal force of a surface was {fell}."
+    opened = f"The bearing opened by at most 4 mm, under {found.records[0]}."
+    for height, begins in (([0.0, np.nan], closed), ([4e-3, 1e-3], opened)):
+        heights[:, 0] = height
+        (words,) = uplift_words(dataclasses.replace(found, values={**found.values, "maximum_uplift": heights}))
+        runs = int((~np.isnan(heights)).sum())
+        assert words == f"{begins} Uplift was simulated in {runs} of {heights.size} runs."
+
+
+def test_no_bound_governs_equal_values_and_no_record_is_their_worst() -> None:
+    """Where nothing opened, the heights are 0 at all bounds and under all records; the envelopes stay."""
+    sources = {name: ColumnSource(RunQuantity("m", name, "most")) for name in ("equal", "differs")}
+    values = {"equal": np.zeros((2, 3)), "differs": np.array([[0.0, 0.0, 0.0], [0.0, 2.0, 1.0]])}
+    found = SuiteBounds("", "asce7", ("A", "B"), (), sources, values, {}, {}, {})
+    equal, differs = found.statistics
+    assert (equal.governs, equal.record, equal.envelope) == ("", "", (0.0, 0.0))
+    assert (differs.governs, differs.record, differs.envelope) == ("nominal", "B", (1.0, 2.0))
+    assert [row[-2:] for row in suite_bound_tables(found)[0].rows] == [("-", "-"), ("nominal", "B")]
 
 
 def test_a_suite_of_a_building_has_the_names_of_its_bearings() -> None:
@@ -521,7 +552,8 @@ def test_a_suite_with_a_failed_run_has_means_of_the_others(upper_fails: None, tm
     found = json.loads(capsys.readouterr().out)
     assert found["left_out"] == ["ridgecrest-2019-ci-clc"] and found["records"] == ["ridgecrest-2019-ci-ccc"]
     row = statistics(out)["peak displacement"]
-    assert row["governs"] and float(row["envelope of means"]) > 0 and found["means"] == {}
+    assert float(row["envelope of means"]) > 0 and found["means"] == {}
+    assert row["governs"] == ""  # the three runs are one
 
 
 def test_a_suite_that_was_interrupted_continues(monkeypatch: Any, tmp_path: Path, capsys: Any) -> None:
@@ -643,5 +675,5 @@ def test_a_run_that_met_its_stop_condition_is_in_no_mean(tmp_path: Path, capsys:
 
 
 def test_records_of_a_suite_have_different_colours() -> None:
-    assert distinct(4) == list(COLOURS[:4])
-    assert all(len(set(distinct(count))) == count for count in (7, 11, 22, 44))
+    assert distinct_colours(4) == list(COLOURS[:4])
+    assert all(len(set(distinct_colours(count))) == count for count in (7, 11, 22, 44))

@@ -181,7 +181,7 @@ CSV_FAULTS = {
     "short row": (CSV + "0.09, 1\n", "line 12: 2 columns, the header names 3"),
     "decimal commas": (CSV.replace("0.1", "0,1"), "columns, the header names 3"),
     "text": (CSV + "0.09, x, 1\n", "line 12: 'x'"),
-    "uneven": (CSV + "0.10, 1, 1\n", "not evenly spaced"),
+    "uneven": (CSV + "0.10, 1, 1\n", "line 12: times are not evenly spaced"),
     "repeated": (CSV + "0.08, 1, 1\n", "not evenly spaced"),
     "no rows": ("time [s], a1 [g]\n", "no rows of numbers"),
     "gram": (CSV.replace("[g]", "[gram]"), "column a1: the unit 'gram' is not a unit"),

@@ -1,4 +1,4 @@
-"""Values of a building that are hardly meant are refused, or named with the likely unit; published designs are not."""
+"""Values of a bearing, a motion or a building that are hardly meant are refused or named; published designs are not."""
 
 from __future__ import annotations
 
@@ -180,6 +180,44 @@ def test_values_that_are_hardly_meant_are_named(name: str, changes: dict[str, An
     scene = changed_scene(name, changes)
     assert sum(words in text for text in doubts_of(scene)) == 1, doubts_of(scene)
     assert any(words in text for text in refusals(scene)) == refused
+
+
+def test_a_bearing_with_ground_of_its_own_is_named_once() -> None:
+    """Two bearings on one loud record and one on a louder: a line for peak and factor; the ground of the others."""
+    scene, loud, louder = building({}), *(building({"motion.scale": scale}).motion for scale in (8.0, 9.0))
+    grounds = [None, loud, loud, louder, *[None] * (len(scene.bearings) - 4)]
+    own = replace(scene, bearings=[replace(b, motion=m) for b, m in zip(scene.bearings, grounds, strict=True)])
+    found = [text for text in doubts(own) if "motion" in text]
+    for text, word in zip(found, ("motion: the peak acceleration", "motion.scale = 8"), strict=True):
+        assert text.startswith(f"{scene.label(1)}: {word}") and text.endswith("; the same holds for 2 other bearings")
+    tables = [row for table in own.explain() for row in table.rows if "motion" in row[0] and row[0] in found]
+    assert len(tables) == 2
+    assert [text.partition(" = ")[0] for text in doubts(replace(own, motion=loud)) if text.startswith("motion.")] == [
+        "motion.scale"
+    ]
+    every = replace(own, bearings=[replace(b, motion=scene.motion) for b in scene.bearings], motion=loud)
+    assert not doubts(every)  # no bearing stands on the ground of the scene
+    small = building({"motion.scale": 1e-3}).motion
+    refused = refusals(replace(scene, bearings=[replace(b, motion=small) for b in scene.bearings]))
+    assert len(refused) == 1 and refused[0].startswith(f"{scene.label(0)}: motion: the peak acceleration")
+
+
+@pytest.mark.parametrize(
+    ("name", "m", "p"),
+    [
+        (TEST, 3, 1), (TEST, 1, 3), ("quintuple-push", 4, 2), ("quintuple-push", 2, 4),
+        ("double-articulated-push", 2, 1), ("single-articulated-push", 2, 0), ("single-articulated-push", 0, 2),
+    ],
+)  # fmt: skip
+def test_m_and_p_against_the_order_of_the_surfaces_are_named(name: str, m: int, p: int) -> None:
+    """By a doubt, or by an error, about the sliders, which then lie in other dishes."""
+    table = tomllib.loads(scene_text(load_scene(name)))
+    table["bearing"]["layout"].update(m=m, p=p)
+    try:
+        texts = doubts(scene_from_table(table))
+    except InputError as error:
+        texts = [str(error)]
+    assert any("rim_radius" in text for text in texts), texts
 
 
 def test_more_than_critical_damping_is_refused() -> None:
