@@ -21,7 +21,7 @@ from msfp_gen import RunError, Scene
 from msfp_gen.common.output import replacing
 from msfp_gen.common.tables import markdown_table, write_rows
 from msfp_gen.studies.accuracy import model_errors, simulate_within, work_precision
-from msfp_gen.studies.accuracy.study import Point, Study, draw, machine, reference_text, without_stop
+from msfp_gen.studies.accuracy.study import ErrorStudy, Point, draw, machine, reference_text, without_stop
 from msfp_gen.studies.accuracy.study import rows as rows_of
 from msfp_gen.studies.accuracy.timed_run import errors, run_native
 
@@ -94,7 +94,7 @@ def percent(value: float) -> str:
     return f"{100 * value:.2g} %"
 
 
-def target(study: Study) -> float:
+def target(study: ErrorStudy) -> float:
     """The RMS error at which the methods of a scene are compared: which the reference is known to a tenth of."""
     floor = study.reference.floor
     return next((t for t in TARGETS_OF_TABLES if floor is None or KNOWN * floor.worst_rms < t), TARGETS_OF_TABLES[-1])
@@ -104,13 +104,13 @@ def times(ratio: float) -> str:
     return f"{ratio:.2g}" if ratio < 100 else f"{ratio:.0f}"
 
 
-def cheapest(study: Study, series: str) -> Point | None:
+def cheapest(study: ErrorStudy, series: str) -> Point | None:
     """The fastest run of a method whose RMS errors are at most the target of its scene; None if there is none."""
     within = [p for p in study.of(series) if p.errors is not None and p.errors.worst_rms <= target(study)]
     return min(within, key=lambda p: p.trial.seconds, default=None)
 
 
-def method_table(study: Study) -> str:
+def method_table(study: ErrorStudy) -> str:
     """For every method the cost of meeting the target, or why it does not meet it."""
     base = cheapest(study, "implicit")
     rows = []
@@ -144,7 +144,7 @@ def why_not(points: list[Point]) -> str:
     return "failed" if best is None else f"no better than {percent(best)}"
 
 
-def model_table(study: Study) -> str:
+def model_table(study: ErrorStudy) -> str:
     """For every model its error at the tightest tolerance, and its cost at 1e-4 over that of the full model."""
     at = {p.series: p for p in study.points if p.trial.rtol == 1e-4}
     rows = []
@@ -161,7 +161,7 @@ def model_table(study: Study) -> str:
     return markdown_table(("model", "force RMS", "peak force", "sliding RMS", "time over the full one"), rows)
 
 
-def measured(case: Case, folder: Path, kind: str) -> tuple[str, Study]:
+def measured(case: Case, folder: Path, kind: str) -> tuple[str, ErrorStudy]:
     """Run one study and write its figure and its data; the section of the page, and the study."""
     begin = time.perf_counter()
     study = (
@@ -285,7 +285,7 @@ def estimate_table() -> str:
     return markdown_table(("scene", "requested", "tolerance chosen", "estimated", "true", "time of the run"), rows)
 
 
-def overview(studies: list[tuple[Case, Study]]) -> str:
+def overview(studies: list[tuple[Case, ErrorStudy]]) -> str:
     """One line per scene: the time of the default method and of the fastest other one."""
     rows = []
     for case, study in studies:

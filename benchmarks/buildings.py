@@ -39,7 +39,7 @@ from msfp_gen import (
 )
 from msfp_gen.buildings.fidelity import rigid_building
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.run import result_of, start_run
+from msfp_gen.buildings.run import building_result, start_building_run
 from msfp_gen.common.arrays import Array
 from msfp_gen.studies.accuracy.series import Series
 
@@ -97,13 +97,13 @@ def tower(count: int, duration: float, solver: Solver | None = None, storeys: in
 
 def timed(scene: BuildingScene, threads: int = 1) -> tuple[BuildingResult, float, float]:
     """The result, and seconds of the processors and of the clock, without the building of the model."""
-    run = start_run(scene, threads)
+    run = start_building_run(scene, threads)
     begin, clock = time.process_time(), time.perf_counter()
     while run.run.advance(1000):
         pass
     seconds = time.process_time() - begin, time.perf_counter() - clock
     assert run.run.status[0] == "ok", run.run.status
-    return result_of(run), *seconds
+    return building_result(run), *seconds
 
 
 def scaling() -> None:

@@ -20,7 +20,7 @@ from msfp_gen import Scene
 from msfp_gen.common.tables import markdown_table
 from msfp_gen.studies.accuracy import work_precision
 from msfp_gen.studies.accuracy.methods import METHODS
-from msfp_gen.studies.accuracy.study import Point, Study
+from msfp_gen.studies.accuracy.study import ErrorStudy, Point
 from msfp_gen.studies.accuracy.timed_run import errors
 
 DAMPING = 1e-4  # [s]
@@ -30,7 +30,7 @@ CONFIRMING, PATIENCE = 1e-5, pick(300.0, 5.0)  # tolerance of Radau, and wall ti
 DEFAULT, TARGET = 1e-3, 1e-3  # tolerance of a run without settings; largest RMS error of the last columns
 
 
-def studied(case: Case, damping: float) -> Study:
+def studied(case: Case, damping: float) -> ErrorStudy:
     """Both methods on a scene with this contact damping [s]."""
     scene: Scene = replace(case.loaded, bearing=case.loaded.bearing.replace(contact_damping=damping))
     study = work_precision(scene, methods=list(MARKERS), tolerances=TOLERANCES, limit=LIMIT * case.limit)
@@ -38,14 +38,14 @@ def studied(case: Case, damping: float) -> Study:
     return study
 
 
-def confirmed(study: Study) -> str:
+def confirmed(study: ErrorStudy) -> str:
     """RMS difference of Radau from the reference; "cut off" where it takes too long."""
     trial = METHODS["Radau"].attempt(study.scene, CONFIRMING, PATIENCE)
     found = errors(trial, study.reference.trial) if trial.finished else None
     return percent(found.worst_rms) if found is not None else f"cut off at {100 * trial.reached / trial.end:.0f} %"
 
 
-def row(case: Case, damping: float, study: Study) -> tuple[str, ...]:
+def row(case: Case, damping: float, study: ErrorStudy) -> tuple[str, ...]:
     """The line of a study: how well the reference is known, the default tolerance, and the cheapest run in the target."""
     floor = study.reference.floor
     assert floor is not None
@@ -67,7 +67,7 @@ def _error(point: Point) -> float:
     return float("inf") if point.errors is None else point.errors.worst_rms
 
 
-def draw(pairs: list[tuple[Case, Study, Study]], path: Path) -> None:
+def draw(pairs: list[tuple[Case, ErrorStudy, ErrorStudy]], path: Path) -> None:
     """Error over cost of both methods, without damping in grey and with it in colour; a panel for each scene."""
     columns = (len(pairs) + 1) // 2
     with drawn(path, 13.0, 6.5) as figure:

@@ -153,7 +153,7 @@ def mat_on_pendulums(inertia: float) -> tuple[Array, Array, Array]:
     assert data.mass is not None
     ground, mass = data.columns["base_acceleration_1"], data.mass / data.bearings
     motion = Motion.from_acceleration(data.time, np.column_stack([ground, 0 * ground, 0 * ground]))
-    effects = Effects(dimension="planar", rims=False, friction="pv", sliders="massless")
+    effects = Effects(dimension="planar", rims=False, friction="constant", sliders="massless")
     load = Load.constant((0.0, 0.0, (inertia - 1.0) * mass * bearing.gravity))
     top = Top.mass(inertia * mass, 1e-3, 0.0)
     history = simulate(Scene(bearing, motion, top, effects, Solver(rtol=1e-5), output_step=0.01, load=load)).history

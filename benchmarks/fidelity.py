@@ -79,7 +79,7 @@ def table(path: Path, count: int, levels: tuple[str, ...], median: float) -> dic
 
 
 class Table:
-    """A source of an estimate: draws of rows of a table, with replacement."""
+    """Runs for an estimate (`ModelRuns`): draws of rows of a table, with replacement."""
 
     population = None
 
@@ -91,19 +91,21 @@ class Table:
         self._done = dict.fromkeys(rows, 0)
 
     def values(self, level: str, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """As of `Source`."""
+        """See `ModelRuns`."""
         self._done[level] = max(count, self._done[level])
         rows = self._rows[level][self._place[:count]]
-        columns = [self._column] if level == "exact" or not self._column else [self._column, 0]  # as of `names_of`
+        columns = (
+            [self._column] if level == "exact" or not self._column else [self._column, 0]
+        )  # see `quantities_of_model`
         values = np.where(np.isnan(rows[:, columns]), np.inf, rows[:, columns])
         return values[:, 0] if len(columns) == 1 else values, rows[:, 4] == 0
 
     def cost(self, level: str) -> float:
-        """As of `Source`."""
+        """See `ModelRuns`."""
         return self._costs[level]
 
     def spent(self) -> tuple[float, dict[str, int]]:
-        """As of `Source`."""
+        """See `ModelRuns`."""
         runs = {level: done for level, done in self._done.items() if done}
         return sum(self._costs[level] * count for level, count in runs.items()), runs
 

@@ -20,7 +20,7 @@ from scipy.stats import t
 from msfp_gen import Measurement, Motion, Scene, fit, load_scene, simulate
 from msfp_gen.common.arrays import Array
 from msfp_gen.studies.calibration.fitting import least_squares, search_range, solve, start_fit
-from msfp_gen.studies.calibration.residuals import Residuals, changed_scene, unknowns_of
+from msfp_gen.studies.calibration.residuals import Residuals, scene_at, unknowns_of
 
 AMPLITUDES = (0.02, 0.06, 0.12)  # [m]
 ROWS, NOISE, OFFSET = 200, 0.01, 0.01  # noise and deviation of the offsets over the peak of all tests
@@ -94,7 +94,7 @@ def noise(correlation: float, rng: np.random.Generator) -> Array:
 def changed(scene: Scene, paths: Sequence[str], factors: Array) -> Scene:
     """The scene with the values at some paths times factors."""
     unknowns = unknowns_of(scene, paths)
-    return changed_scene(scene, unknowns, np.array([u.start for u in unknowns]) * factors)
+    return scene_at(scene, unknowns, np.array([u.start for u in unknowns]) * factors)
 
 
 def coverage(count: int) -> None:
@@ -185,7 +185,7 @@ class Differences(Residuals):
         test, columns = self.tests[index], []
 
         def force(at: Array) -> Array:
-            run = simulate(changed_scene(self.scenes[index], self.unknowns, at), progress=show).history
+            run = simulate(scene_at(self.scenes[index], self.unknowns, at), progress=show).history
             self.runs += index == 0
             return np.asarray(np.interp(test.time - test.time[0], run.time, run.top_force[:, 0]))
 

@@ -14,6 +14,7 @@ from datetime import date
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+from textwrap import wrap
 from typing import NamedTuple
 
 import numpy as np
@@ -240,6 +241,20 @@ def plant() -> Iterator[Case]:
         )
 
 
+def plant_words() -> str:
+    """Largest displacements and RMS differences of the plant, with inertia twice and as stated."""
+    words = []
+    for times, name in ((1.0, "once, as stated"), (2.0, "twice")):
+        _, theirs, ours = external.mat_on_pendulums(times)
+        apart = float(np.sqrt(np.mean((ours - theirs) ** 2)) / np.abs(theirs).max())
+        words.append(
+            f"with inertia {name}, u is {-1e3 * ours.min():.1f} mm to one side and {1e3 * ours.max():.1f} mm to the other, "
+            f"and off by {100 * apart:.1f} % of the largest published value (RMS of all rows)"
+        )
+    text = f"{words[0][0].upper()}{words[0][1:]}; {words[1]}."
+    return "\n".join(wrap(text, 118, subsequent_indent="  ", break_on_hyphens=False))
+
+
 def programs() -> Iterator[Case]:
     """OpenSees, element TripleFrictionPendulum: the largest force of a scene, and with friction at the pivot as there."""
     for scene in (manual_scene(), *(load_scene(name) for name in OPENSEES_SCENES)):
@@ -343,6 +358,7 @@ def page(rows: list[Case], found: list[external.Series], past: list[dict[str, st
         "history": markdown_table(tuple(past[-1]), (one.values() for one in past)),
         "count": past[-1]["comparisons"],
         "within": past[-1]["within"],
+        "plant": plant_words(),
         "programs": versions(),
         "date": f"{date.today()}",
     }.items():

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from msfp_gen.buildings import file as buildings
-from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
+from msfp_gen.buildings.bearing import BuildingBearing
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.storey import BaseSlab, Soil, Storey
 from msfp_gen.common.fields import Choice, G, Quantity, Rule, ruled_fields
 from msfp_gen.common.tables import markdown_table

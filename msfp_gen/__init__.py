@@ -13,6 +13,7 @@ from msfp_gen.common.version import __version__
 if TYPE_CHECKING:
     from msfp_gen.auditing import audit as audit
     from msfp_gen.auditing.shadow import shadow as shadow
+    from msfp_gen.buildings.bearing import BuildingBearing as BuildingBearing
     from msfp_gen.buildings.building import Building as Building
     from msfp_gen.buildings.figures import plot_axial_forces as plot_axial_forces
     from msfp_gen.buildings.figures import plot_building as plot_building
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from msfp_gen.buildings.figures import plot_plan as plot_plan
     from msfp_gen.buildings.figures import plot_profile as plot_profile
     from msfp_gen.buildings.result import BuildingResult as BuildingResult
-    from msfp_gen.buildings.scene import BuildingBearing as BuildingBearing
     from msfp_gen.buildings.scene import BuildingScene as BuildingScene
     from msfp_gen.buildings.storey import BaseSlab as BaseSlab
     from msfp_gen.buildings.storey import Soil as Soil
@@ -83,7 +83,7 @@ _MODULES = {
     "Bearing": "scene.bearing",
     "Body": "scene.bearing",
     "Building": "buildings.building",
-    "BuildingBearing": "buildings.scene",
+    "BuildingBearing": "buildings.bearing",
     "BuildingResult": "buildings.result",
     "BuildingScene": "buildings.scene",
     "CompileError": "common.errors",

@@ -19,7 +19,7 @@ _BEFORE = pytest.StashKey[set[str]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--update", action="store_true", help="rewrite the golden files of tests/golden")
+    parser.addoption("--update", action="store_true", help="rewrite tests/golden/msfp.h")
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +32,7 @@ def no_idle_workers() -> Iterator[None]:
 
 @pytest.fixture
 def update(request: pytest.FixtureRequest) -> bool:
-    """Whether golden files are rewritten instead of compared."""
+    """Whether tests/golden/msfp.h is rewritten instead of compared."""
     return bool(request.config.getoption("--update"))
 
 

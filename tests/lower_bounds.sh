@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The lowest versions of the dependencies that pyproject.toml allows: a preset runs, and the tests pass that call every
-# library: SymPy and Jinja2 (golden files), pint and tomli-w (scenes), SciPy (records and spectra), xarray, HDF5,
+# library: SymPy and Jinja2 (the public header), pint and tomli-w (scenes), SciPy (records and spectra), xarray, HDF5,
 # pandas and pyarrow (results), matplotlib (figures).
 # Warnings are no errors here: old versions warn of the newer packages that they themselves use.
 set -euo pipefail

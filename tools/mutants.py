@@ -95,7 +95,6 @@ CHOSEN: dict[str, tuple[str, ...]] = {
     "*/runtime/api/two_port.c": ("tests/unit/embedding/test_two_port.py", "tests/unit/embedding/test_two_port_in_c.py"),
     "*/runtime/api/*": ("tests/unit/test_python_users.py", "tests/unit/embedding/test_library.py"),
 }
-GOLDEN = "tests/unit/generator/test_golden.py"
 PATIENCE = 5.0  # a mutant may take that many times longer than the tests without one; a hang is seen
 
 
@@ -238,7 +237,6 @@ class Copy:
     def tested(self, part: str, tests: tuple[str, ...], limit: float | None) -> str:
         """How tests end: "passed", "failed" or "hung"."""
         command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-m", "not slow", "-p", "no:cacheprovider"]
-        command += [f"--ignore={GOLDEN}"] if GOLDEN not in tests else []
         cache = self.folder / "models" if PARTS[part].builds else ROOT / "build" / "models"
         environment = {**os.environ, "PYTHONPATH": str(self.folder), "MSFP_GEN_CACHE": str(cache)}
         with subprocess.Popen(

@@ -6,14 +6,16 @@ docs/audit.md describes columns, maps and checks.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from msfp_gen.auditing.checks import CHECKS, CONSISTENT, INCONSISTENT, OPEN, AuditCase, Finding
+from msfp_gen.auditing.case import CONSISTENT, INCONSISTENT, OPEN, AuditCase, Finding
+from msfp_gen.auditing.checks import CHECKS
 from msfp_gen.auditing.columns import histories_from, read_histories
 from msfp_gen.auditing.corrections import corrected
 from msfp_gen.auditing.histories import Histories
+from msfp_gen.auditing.implied import ImpliedRange, implied_figures, implied_ranges
 from msfp_gen.auditing.stated import stated_of
 from msfp_gen.common.tables import Table
 
@@ -28,11 +30,15 @@ class Audit:
         name: of the file or result.
         bearing: name of the bearing.
         findings: one for every check, in the order of `CHECKS`.
+        coefficients: the range of the friction coefficient that the data imply, by speed, axial force and time.
+        figures: the same, drawn over each of these.
     """
 
     name: str
     bearing: str
     findings: tuple[Finding, ...]
+    coefficients: tuple[ImpliedRange, ...] = ()
+    figures: tuple[Finding, ...] = field(default=(), repr=False)
 
     @property
     def inconsistent(self) -> tuple[Finding, ...]:
@@ -54,7 +60,7 @@ class Audit:
 
     @property
     def tables(self) -> list[Table]:
-        """Verdict, number and time of every check; and what was found, the inconsistent findings first."""
+        """Verdict, number and time of every check; coefficients; what was found, the inconsistent findings first."""
         rows = [
             (one.title, one.verdict.upper() if one.verdict == INCONSISTENT else one.verdict, _number(one), _place(one))
             for one in self.findings
@@ -66,16 +72,20 @@ class Audit:
         )
         order = [INCONSISTENT, CONSISTENT, OPEN]
         said = sorted(self.findings, key=lambda one: order.index(one.verdict))
-        return [summary, Table("what was found", (), [(one.check, one.sentence) for one in said])]
+        head = ("by", "range", "rows", "median", "5 to 95 % of the rows", "law")
+        implied = [Table("friction coefficient that the data imply", head, [one.cells for one in self.coefficients])]
+        found = Table("what was found", (), [(one.check, one.sentence) for one in said])
+        return [summary, *(implied if self.coefficients else []), found]
 
     @property
     def as_dict(self) -> dict[str, Any]:
-        """The audit as plain data: name, bearing, text, findings."""
+        """The audit as plain data: name, bearing, text, findings, coefficients."""
         return {
             "name": self.name,
             "bearing": self.bearing,
             "text": self.text,
             "findings": [one.as_dict for one in self.findings],
+            "coefficients": [one._asdict() for one in self.coefficients],
         }
 
     def page(self, path: str | Path) -> Path:
@@ -108,4 +118,5 @@ def audit(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | N
     data, found = corrected(given, stated)
     case = AuditCase(given, stated, data, found)
     findings = tuple(Finding(key, title, *check(case)) for key, (title, check) in CHECKS.items())
-    return Audit(given.name, stated.name, findings)
+    coefficients = implied_ranges(case)
+    return Audit(given.name, stated.name, findings, coefficients, implied_figures(case, coefficients))

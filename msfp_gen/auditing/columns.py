@@ -24,13 +24,9 @@ from msfp_gen.scene.file.loader import toml_file
 
 _CELL = re.compile(r"\s*(-?)\s*(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))?\s*")
 _KEYS = {"columns", "mass", "bearings", "title"}
-# Columns of a CSV of this package, where no map is given. The vertical displacement is base - top.
+# Columns of a CSV of this package, where no map is given, beside those whose sign it states.
 OWN = {
     "time": "time",
-    **{f"displacement_{i}": f"displacement_E{i}" for i in (1, 2)},
-    "rise": "-displacement_E3",
-    **{f"force_{i}": f"top_force_E{i}" for i in (1, 2)},
-    "axial": "top_force_E3",
     **{f"lower_{i}": f"base_displacement_E{i}" for i in (1, 2, 3)},
     **{f"upper_{i}": f"top_displacement_E{i}" for i in (1, 2, 3)},
     **{f"{name}_{i}": f"{name}_{i}" for name in ("sliding", "temperature") for i in range(1, 10)},
@@ -159,7 +155,7 @@ def read_histories(path: str | Path, columns: str | Path | Mapping[str, Any] | N
     own = source is None
     tables = {path: read_table(path)}
     found: dict[str, Array] = {}
-    for name, entry in (OWN if own else _columns(source)).items():
+    for name, entry in (_own_columns(tables[path]) if own else _columns(source)).items():
         file, text = (folder / entry["file"], entry["column"]) if isinstance(entry, dict) else (path, entry)
         if file not in tables:
             tables[file] = read_table(file)
@@ -184,6 +180,17 @@ def read_histories(path: str | Path, columns: str | Path | Mapping[str, Any] | N
         None if mass is None else _quantity("mass", mass, "kg"),
         1.0 if bearings is None else _quantity("bearings", bearings, ""),
     )
+
+
+def _own_columns(table: TextTable) -> dict[str, str]:
+    """Columns of a CSV of this package: the force of its uppermost surface, or on the top support; u is base - top."""
+    present = {_split(cell)[0] for cell in table.names}
+    surfaces = [i for i in range(1, 10) if f"interface_force_{i}_E3" in present]
+    turned = "u = top - base" in table.lines[0]  # u, and the force on the top support, have the other sign then
+    minus, plus = ("", "-") if turned else ("-", "")
+    force = f"interface_force_{surfaces[-1]}" if surfaces else f"{plus}top_force"
+    found = {f"displacement_{i}": f"{plus}displacement_E{i}" for i in (1, 2)} | {"rise": f"{minus}displacement_E3"}
+    return OWN | found | {f"force_{i}": f"{force}_E{i}" for i in (1, 2)} | {"axial": f"{force}_E3"}
 
 
 def _slip_speeds(table: TextTable) -> dict[str, Array]:

@@ -10,11 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.stated import Stated
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, Flags
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load
@@ -23,6 +22,7 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import RigTop
 from msfp_gen.specification.layout import Auto
 
+OFF_CENTRE = 0.05  # permitted first displacement over the largest
 LEAST_LOAD = 0.02  # axial force over that at rest, below which surfaces may part
 HOLD = 5e3  # stiffness of the rig over the axial force at rest [1/m]: it moves some hundredths of a millimetre
 RELAXED = 1e-3  # damping of the rig over its stiffness [s]
@@ -30,11 +30,21 @@ SAME_MOTION = 0.02  # RMS difference between the displacement and the motion of 
 ENDS = ("lower", "upper")
 
 
-def opens(data: Histories) -> NDArray[np.bool_]:
+def opens(data: Histories) -> Flags:
     """Rows after the first motion in which the axial force is nearly zero or a tension, ndarray of bool, shape (T,)."""
-    low: NDArray[np.bool_] = data.axial < LEAST_LOAD * data.at_rest
-    low[: data.moved_at()] = False
-    return low
+    return data.below(LEAST_LOAD)
+
+
+def off_centre(data: Histories) -> float:
+    """First displacement [m]; 0 where it is small enough for a model, which begins at the centre."""
+    start, most = (float(np.hypot(*rows)) for rows in (data.displacement[0], np.abs(data.displacement).max(axis=0)))
+    return start if start > OFF_CENTRE * most else 0.0
+
+
+def force_of(result: Result, data: Histories) -> Array:
+    """Force of a run on its upper plate at the rows of a record, without the inertia of the plate, (T, 2) [N]."""
+    time, own = data.time - data.time[0], result.alone.history
+    return np.column_stack([np.interp(time, own.time, own.interface_force[:, -1, i]) for i in (0, 1)])
 
 
 def ends(data: Histories) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, Flags
 from msfp_gen.common.errors import InputError
 from msfp_gen.motions.checks import finite
 from msfp_gen.results.geometry import body_bases
@@ -112,10 +112,22 @@ class Histories:
         """Axial force, compression positive, ndarray, shape (T,) [N]."""
         return self.columns["axial"]
 
-    @property
+    @cached_property
     def at_rest(self) -> float:
-        """Median of the axial force [N]."""
-        return float(np.median(self.axial))
+        """Axial force at rest [N]: its mean over time from the first motion on, since the mass ends where it began."""
+        time, axial = self.time[self.moved_at() :], self.axial[self.moved_at() :]
+        return float(np.trapezoid(axial, time) / (time[-1] - time[0])) if len(time) > 1 else float(axial[0])
+
+    @property
+    def before(self) -> float:
+        """Axial force before the first motion, the median of these rows [N]."""
+        return float(np.median(self.axial[: self.moved_at() + 1]))
+
+    def below(self, share: float) -> Flags:
+        """Rows after the first motion with an axial force below a share of its value at rest, ndarray, shape (T,)."""
+        low: Flags = self.axial < share * self.at_rest
+        low[: self.moved_at()] = False
+        return low
 
     @property
     def step(self) -> float:
@@ -140,11 +152,12 @@ def histories_of(result: Any) -> Histories:
     if not result.is_alone:
         raise InputError("result: this is the result of a building; give one of its .bearings as a table of columns")
     rows, top = result.history, result.scene.top
-    columns = {"time": rows.time, "axial": rows.top_force[:, 2], "rise": -rows.displacement[:, 2]}
+    force = rows.interface_force[:, -1]  # without inertia of the upper plate, which hangs on the mass at lift-off
+    columns = {"time": rows.time, "axial": force[:, 2], "rise": -rows.displacement[:, 2]}
     for axis in range(2):
         columns |= {
             f"displacement_{axis + 1}": rows.displacement[:, axis],
-            f"force_{axis + 1}": rows.top_force[:, axis],
+            f"force_{axis + 1}": force[:, axis],
         }
     base = result.scene.motion.rotation(np.clip(rows.time, 0.0, result.scene.motion.duration))
     ends = {"lower": rows.base_displacement, "upper": rows.top_displacement - rows.top_displacement[0]}

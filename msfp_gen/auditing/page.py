@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.auditing.checks import CONSISTENT, INCONSISTENT, NONE, OPEN, SHOWN, Drawing, Finding
+from msfp_gen.auditing.case import CONSISTENT, INCONSISTENT, NONE, OPEN, SHOWN, Drawing, Finding
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.common.version import __version__
@@ -119,8 +119,9 @@ def audit_opinion(audit: Audit) -> Opinion:
     groups = [
         (word, [one for one in audit.findings if one.verdict == word]) for word in (INCONSISTENT, CONSISTENT, OPEN)
     ]
+    groups.append(("friction coefficient that the data imply", list(audit.figures)))
     title = f"{audit.name} against {audit.bearing}"
-    return Opinion(title, "audit", f"{audit.text}.", "Verdicts", audit.tables[:1], groups, TERMS)
+    return Opinion(title, "audit", f"{audit.text}.", "Verdicts", audit.tables[:-1], groups, TERMS)
 
 
 def shadow_opinion(shadow: Shadow) -> Opinion:

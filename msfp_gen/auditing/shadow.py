@@ -14,11 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.auditing.checks import INCONSISTENT, NO_TENSION
+from msfp_gen.auditing.case import INCONSISTENT
 from msfp_gen.auditing.columns import histories_from
 from msfp_gen.auditing.corrections import corrected
-from msfp_gen.auditing.driving import LEAST_LOAD, even_load, opening_scene, opens, shadow_scene
+from msfp_gen.auditing.driving import LEAST_LOAD, even_load, force_of, off_centre, opening_scene, opens, shadow_scene
 from msfp_gen.auditing.histories import QUANTITIES, Histories
+from msfp_gen.auditing.mechanics import holds_down
 from msfp_gen.auditing.stated import Stated, stated_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
@@ -30,7 +31,6 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.specification.friction_laws import BUILT_IN
 
-OFF_CENTRE = 0.05  # permitted first displacement over the largest
 SURFACES = ("sliding", "slip_speed", "temperature")  # columns with the number of a surface
 BOUNCES = 0.05  # closed for less, surfaces bounce [s]
 TIGHTER = 0.1  # tolerance of the run that states the error, over the shadow's
@@ -104,7 +104,7 @@ class Shadow:
     @cached_property
     def force(self) -> Array:
         """Horizontal force of the model at the rows of the record, ndarray, shape (T, 2) [N]."""
-        return _force(self.result, self.data)
+        return force_of(self.result, self.data)
 
     @cached_property
     def histories(self) -> dict[tuple[str, int], tuple[Array, Array]]:
@@ -270,8 +270,7 @@ def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | 
     if missing := given.missing("displacement", "force", "axial"):
         raise InputError(f"{given.name}: no column {missing[0]}; a shadow needs displacement, force and axial")
     data, found = corrected(given, stated)
-    start, most = (float(np.hypot(*rows)) for rows in (data.displacement[0], np.abs(data.displacement).max(axis=0)))
-    if start > OFF_CENTRE * most:
+    if start := off_centre(data):
         raise InputError(
             f"{given.name}: the first displacement is {1e3 * start:.4g} mm; cut the record to begin at the centre"
         )
@@ -282,22 +281,16 @@ def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | 
         raise InputError(f"{given.name}: {beyond[0]}: the bearing has {stated.bearing.layout.surfaces} surfaces")
     scene = shadow_scene(data, stated)
     result = simulate(scene)
-    force = _force(result, data)
+    force = force_of(result, data)
     finer = simulate(replace(scene, solver=replace(scene.solver, rtol=TIGHTER * scene.solver.rtol)))
     coarser = simulate(shadow_scene(data, stated, 2))
     opened = simulate(opening_scene(data, scene, result)) if opens(data).any() else None
     largest = float(np.hypot(*data.force.T).max())
-    others = [np.sqrt(np.mean(np.sum((_force(one, data) - force) ** 2, axis=1))) for one in (finer, coarser)]
+    others = [np.sqrt(np.mean(np.sum((force_of(one, data) - force) ** 2, axis=1))) for one in (finer, coarser)]
     error = float(np.hypot(others[0], others[1] / 3.0)) / largest
-    left_out = tuple(_left_out(scene, result, data, error))
+    left_out = tuple(_left_out(scene, stated, result, data, error))
     notes = [answer.sentence for answer in found.values() if answer.verdict == INCONSISTENT]
     return Shadow(data, stated, result, opened, error, left_out, tuple(notes))
-
-
-def _force(result: Result, data: Histories) -> Array:
-    """Force of a run on its upper plate at the rows of a record, without the inertia of the plate, (T, 2) [N]."""
-    time, own = data.time - data.time[0], result.alone.history
-    return np.column_stack([np.interp(time, own.time, own.interface_force[:, -1, i]) for i in (0, 1)])
 
 
 def _difference(force: Array, data: Histories) -> float:
@@ -322,15 +315,15 @@ def _variants(scene: Scene, result: Result, data: Histories) -> Iterator[tuple[s
         yield "sliding regimes", lambda one: replace(at_fidelity(one, "equivalent"), duration=one.end)
 
 
-def _left_out(scene: Scene, result: Result, data: Histories, error: float) -> Iterator[LeftOut]:
+def _left_out(scene: Scene, stated: Stated, result: Result, data: Histories, error: float) -> Iterator[LeftOut]:
     """Effects taken out one after the other; those that the element does not have stay out."""
-    before = _difference(_force(result, data), data)
-    if data.axial.min() < -NO_TENSION * data.at_rest:
+    before = _difference(force_of(result, data), data)
+    if holds_down(data, stated):
         yield LeftOut("lift-off", before, None, True, "its axial force is a tension")
     for name, without in _variants(scene, result, data):
         try:
             changed = without(scene)
-            after = _difference(_force(simulate(changed), data), data)
+            after = _difference(force_of(simulate(changed), data), data)
         except (InputError, RunError) as failure:
             yield LeftOut(name, before, None, False, str(failure))
             continue

@@ -12,13 +12,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.stated import Coefficients, Stated
-from msfp_gen.common.arrays import Array
-
-Rows = NDArray[np.intp]
+from msfp_gen.common.arrays import Array, Flags, Indices
 
 STRAIGHT = 0.99  # chord over arc of a path that is straight, and cosine of the velocity along it
 CLOSED = 0.2  # axial force over that at rest, below which a bearing may be opening
@@ -82,19 +79,35 @@ class Sliding:
         along = (v * direction).sum(axis=1)
         far = arc - arc[np.maximum(before, 0)]
         good = (before >= 0) & (length >= STRAIGHT * far) & (along >= STRAIGHT * speed) & (speed > SLOW * speed.max())
-        if "axial" in data.columns:
-            good &= data.axial > CLOSED * data.at_rest
-        # A row is left out where the path behind it was near a rim: the links have other places then.
-        near = arc[np.hypot(*u.T) > NEAR_RIM * stated.first_rim]
-        if len(near):
-            last = np.searchsorted(near, arc, side="right") - 1
-            good &= (last < 0) | (arc - near[np.maximum(last, 0)] > 2.0 * stated.turning)
+        good &= self.settled
         # Strokes end where the path is not straight, or turns.
         starts = good & ~np.append(False, good[:-1])
         return np.where(good[:, None], direction, 0.0), np.where(good, np.cumsum(starts), 0)
 
     @cached_property
-    def rows(self) -> Rows:
+    def closed(self) -> Flags:
+        """Rows with closed surfaces, after a path in which links that parted find their places, ndarray, shape (T,)."""
+        data = self.histories
+        if "axial" not in data.columns:
+            return np.ones(len(data.time), dtype=bool)
+        return self._after(data.below(CLOSED)) & (data.axial > CLOSED * data.at_rest)
+
+    @cached_property
+    def settled(self) -> Flags:
+        """The closed rows that are not near a rim, and after a path in which links leave it, ndarray, shape (T,)."""
+        near: Flags = np.hypot(*self.histories.displacement.T) > NEAR_RIM * self.stated.first_rim
+        return self.closed & self._after(near)
+
+    def _after(self, loose: Flags) -> Flags:
+        """Rows in whose path, as long as links need to find their places, no row is loose, (T,)."""
+        u = self.histories.displacement
+        arc = np.cumsum(np.hypot(*np.diff(u, axis=0, prepend=u[:1]).T))
+        latest = np.maximum.accumulate(np.where(loose, arc, -np.inf))
+        after: Flags = arc - latest > 2.0 * self.stated.turning
+        return after
+
+    @cached_property
+    def rows(self) -> Indices:
         """Row numbers, ndarray of int, shape (k,)."""
         return np.flatnonzero(self._strokes[1])
 
@@ -162,7 +175,7 @@ class Sliding:
             "radius": rest * restoring,
             "friction": rest * law.cold[rows] * arm,
             "heat": rest * heat * arm,
-            "coupling": (axial - rest) * (restoring + law.heated[rows] * arm),
+            "coupling": (axial - rest) * force / axial,  # of the friction that acts, whatever it is
             "damping": speed,
         }
         scale = float(np.abs(force).max())

@@ -9,7 +9,7 @@ while both outermost surfaces slide the same way.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -82,8 +82,12 @@ class Stated:
     @cached_property
     def pivot_ratio(self) -> float:
         """Friction if coefficients were taken at the pivot in place of the surface, over `friction` [-]; 1: without."""
-        at_pivot = sum(link.effective * self.bearing.surfaces[link.surface].friction for link in self.outer)
-        return at_pivot / self.radius / self.friction if self.friction else 1.0
+        try:
+            own = [surface.friction for surface in self.bearing.surfaces]
+            at_pivot = replace(self, bearing=self.bearing.replace(friction=own, friction_at="pivot"))
+        except InputError:  # its pivot is not the middle of a slider
+            return 1.0
+        return at_pivot.friction / self.friction if self.friction else 1.0
 
     @cached_property
     def backbone(self) -> Backbone:
@@ -121,6 +125,11 @@ class Stated:
 
     def _tilt_limit(self, link: Link) -> float:
         return link.limit + (0.0 if link.outside is None else self._tilt_limit(self.links[link.outside]))
+
+    @cached_property
+    def steepest(self) -> float:
+        """Largest slope of a rim, the tangent of the largest tilt of a slider [-]."""
+        return float(np.tan(max(self._tilt_limit(link) for link in self.links)))
 
     @property
     def capacity(self) -> float:

@@ -14,17 +14,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from msfp_gen.buildings.oscillators import FixedBase, Oscillators
 from msfp_gen.buildings.storey import FREEDOMS, MOTIONS, BaseSlab, Node, Storey, StoreyColumns, frame, rigid
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, Indices
 from msfp_gen.common.errors import InputError, MsfpError
 from msfp_gen.common.fields import LARGEST, quantities, require_type
 from msfp_gen.common.inputs import read_input
-from msfp_gen.common.tables import Printed, Rows
+from msfp_gen.common.tables import LabelledValues, Printed
 
-Indices = NDArray[np.intp]
 _FORMS = {"coordinate": 3, "array": 2}  # form of a Matrix Market file -> numbers in the line of sizes
 _HEADER = "%%MatrixMarket matrix coordinate|array real|integer general|symmetric"
 
@@ -98,7 +97,7 @@ class Building(Printed):
     nodes: tuple[Node, ...]
     columns: tuple[StoreyColumns, ...] = ()
 
-    def printed_rows(self) -> tuple[str, Rows]:
+    def printed_rows(self) -> tuple[str, LabelledValues]:
         """Sizes and frequencies in four rows."""
         listed = ", ".join(f"{frequency:.4g}" for frequency in self.frequencies[:6])
         more = f", ... of {len(self.frequencies)}" if len(self.frequencies) > 6 else ""

@@ -32,7 +32,7 @@ from msfp_gen.results.variables import (
     column_places,
     dataset_of,
     digest_of_names,
-    labelled,
+    label_coordinates,
     stored_fields,
 )
 from msfp_gen.scene.file.loader import bearing_table, dumps, plain_table, toml_table
@@ -237,7 +237,7 @@ def to_dataset(result: Any) -> xr.Dataset:
     about |= {"motion": PIECES, "padding": "NaN: the bearing has no such surface"}
     storeys = bool(result.scene.building.columns)
     variables = {name: variable for name, variable in VARIABLES.items() if storeys or "storey" not in variable.dims}
-    return dataset_of(variables, arrays_of(result), labelled(labels_of(result.scene)), about)
+    return dataset_of(variables, arrays_of(result), label_coordinates(labels_of(result.scene)), about)
 
 
 def labels_of(scene: BuildingScene) -> Labels:

@@ -6,9 +6,11 @@ from collections.abc import Hashable, Iterable, Iterator
 
 import numpy as np
 
+from msfp_gen.buildings.bearing import standing_below
+from msfp_gen.buildings.effects import remaining_loads
 from msfp_gen.buildings.notes import building_doubts, ground_doubts, shared
-from msfp_gen.buildings.scene import BuildingScene, remaining_loads, standing_below
-from msfp_gen.common.tables import Table, vector
+from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.tables import Table, vector_text
 from msfp_gen.results.note import Note
 from msfp_gen.scene.explain import (
     body_table,
@@ -31,7 +33,7 @@ def explain(scene: BuildingScene) -> list[Table]:
     """Tables that describe the scene of a building."""
     return [
         frame_table(scene),
-        bearing_table(scene),
+        bearings_table(scene),
         *_kinds(scene),
         *_interfaces(scene),
         *doubt_tables(_doubts(scene)),
@@ -48,17 +50,17 @@ def frame_table(scene: BuildingScene) -> Table:
     more = f", the first {LISTED} of {len(building.frequencies)}" if len(building.frequencies) > LISTED else ""
     listed_nodes: dict[str, list[str]] = {"diaphragms": [], "nodes": []}
     for node in building.nodes:
-        listed_nodes["diaphragms" if node.floor else "nodes"].append(f"{node.name} ({vector(node.position)} m)")
+        listed_nodes["diaphragms" if node.floor else "nodes"].append(f"{node.name} ({vector_text(node.position)} m)")
     rows = [
         ("weight", f"{scene.weight * 1e-6:.5g} MN at g = {scene.gravity:g} m/s^2"),
         ("degrees of freedom", str(len(building.mass))),
         *((name, ", ".join(places)) for name, places in listed_nodes.items() if places),
-        ("frequencies on a fixed base", f"{vector(listed)} Hz{more}" if len(listed) else "none: a rigid body"),
+        ("frequencies on a fixed base", f"{vector_text(listed)} Hz{more}" if len(listed) else "none: a rigid body"),
     ]
     return Table("building", (), rows)
 
 
-def bearing_table(scene: BuildingScene) -> Table:
+def bearings_table(scene: BuildingScene) -> Table:
     """Kind, position and load at rest of every bearing."""
     kinds = grouped(scene.every_bearing)
     kind_of = {index: str(number) for number, members in enumerate(kinds, start=1) for index in members}

@@ -12,7 +12,7 @@ from typing import Annotated, get_type_hints
 import numpy as np
 
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.common.arrays import Array, parts
+from msfp_gen.common.arrays import Array, Flags, parts
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.friction_parameters import start_temperatures
 
@@ -88,72 +88,78 @@ class BuildingExtremes:
 
         kept: names and shapes for each bearing.
         """
-        nodes, storeys = len(scene.building.nodes), len(scene.building.columns)
         floors = np.array([node.floor for node in scene.building.nodes], dtype=bool)
-        vectors = {
-            "node_acceleration": nodes,
-            "node_displacement": nodes,
-            "drift": storeys,
-            "storey_shear": storeys,
-            "torsion": storeys,
-            "twist": 1,
-            "mean": 1,
-            "overturning": 1,
-            "corner": CORNERS * storeys,
-            "floor_acceleration": CORNERS * int(floors.sum()),
-            "floor_displacement": CORNERS * int(floors.sum()),
-            "base": 1,
-        }
-        shapes: Shapes = [(name, (count, VECTOR)) for name, count in vectors.items()]
-        shapes += [("base_torsion", (1,)), ("energy", (2,))]
-        for i, numbers in enumerate(kept):
+        shapes = _recorded(len(floors), len(scene.building.columns), int(floors.sum()))
+        for i, (bearing, numbers) in enumerate(zip(scene.every_bearing, kept, strict=True)):
             shapes += [(f"displacement {i}", (VECTOR,)), (f"force {i}", (VECTOR,)), (f"axial {i}", (2,))]
             shapes += [(f"{word} {name} {i}", shape) for word in ("least", "most") for name, shape in numbers]
-            shapes += [(f"contact {i}", (scene.bearings[i].bearing.layout.surfaces,)), (f"met {i}", (1,))]
+            shapes += [(f"contact {i}", (bearing.layout.surfaces,)), (f"met {i}", (1,))]
         values, times = (parts(each, shapes) for each in recorded)
         for i, bearing in enumerate(scene.every_bearing):
             values[f"contact {i}"] = values[f"contact {i}"] * bearing.arrays()["radius"]
             values[f"least compression {i}"] = lift_of(values[f"least compression {i}"])
             values[f"most temperature {i}"] = temperature_of(bearing, values[f"most temperature {i}"])
+        return cls(**_arranged(values, values, floors, len(kept)), times=_arranged(times, values, floors, len(kept)))
 
-        def of_corners(name: str, of: dict[str, Array]) -> Array:
-            """Of the corners of each floor the largest value, or its time, shape (floors, 4)."""
-            size, each = values[name].reshape(-1, CORNERS, VECTOR), of[name].reshape(-1, CORNERS, VECTOR)
-            found: Array = np.take_along_axis(each, size.argmax(axis=1)[:, None], axis=1)[:, 0]
-            return found
 
-        def arranged(of: dict[str, Array]) -> dict[str, Array]:
-            def of_bearings(name: str) -> list[Array]:
-                return [of[f"{name} {i}"] for i in range(len(kept))]
+def _recorded(nodes: int, storeys: int, floors: int) -> Shapes:
+    """Names and shapes of what a compiled run records of the building, in its order."""
+    counts = {
+        "node_acceleration": nodes,
+        "node_displacement": nodes,
+        "drift": storeys,
+        "storey_shear": storeys,
+        "torsion": storeys,
+        "twist": 1,
+        "mean": 1,
+        "overturning": 1,
+        "corner": CORNERS * storeys,
+        "floor_acceleration": CORNERS * floors,
+        "floor_displacement": CORNERS * floors,
+        "base": 1,
+    }
+    return [*((name, (count, VECTOR)) for name, count in counts.items()), ("base_torsion", (1,)), ("energy", (2,))]
 
-            corners = {}
-            for name in ("acceleration", "displacement"):
-                corners[f"corner_{name}"] = of[f"node_{name}"].copy()
-                corners[f"corner_{name}"][floors] = of_corners(f"floor_{name}", of)
-            return {
-                **{name: of[name] for name in list(vectors)[:4]},
-                **corners,
-                "corner_drift": of_corners("corner", of),
-                "storey_torsion": of["torsion"][:, 2],
-                "base_twist": of["twist"][:, 2],
-                "mean_displacement": of["mean"][0],
-                "overturning_moment": of["overturning"][0],
-                "base_reaction": of["base"][0],
-                "base_torsion": of["base_torsion"],
-                "energy": of["energy"],
-                "bearing_displacement": np.array(of_bearings("displacement")),
-                "top_force": np.array(of_bearings("force")),
-                "axial_force": np.array(of_bearings("axial")),
-                "sliding": padded(of_bearings("most sliding")),
-                "rim_force": padded(of_bearings("most rim")),
-                "lift": padded(of_bearings("least compression")),
-                "contact_offset": padded(of_bearings("contact")),
-                "temperature": padded(of_bearings("most temperature")),
-                "normal_force": np.stack([padded(of_bearings(f"{word} normal")) for word in ("least", "most")], axis=1),
-                "rims_met": np.concatenate(of_bearings("met")),
-            }
 
-        return cls(**arranged(values), times=arranged(times))
+def _of_corners(name: str, of: Mapping[str, Array], values: Mapping[str, Array]) -> Array:
+    """Of the corners of each floor the largest of `values`, or what `of` has there, shape (floors, 4)."""
+    size, each = values[name].reshape(-1, CORNERS, VECTOR), of[name].reshape(-1, CORNERS, VECTOR)
+    found: Array = np.take_along_axis(each, size.argmax(axis=1)[:, None], axis=1)[:, 0]
+    return found
+
+
+def _arranged(of: Mapping[str, Array], values: Mapping[str, Array], floors: Flags, bearings: int) -> dict[str, Array]:
+    """The fields of `BuildingExtremes` from the values by name, or from their times. floors: which nodes are floors."""
+
+    def of_bearings(name: str) -> list[Array]:
+        return [of[f"{name} {i}"] for i in range(bearings)]
+
+    corners = {}
+    for name in ("acceleration", "displacement"):
+        corners[f"corner_{name}"] = of[f"node_{name}"].copy()
+        corners[f"corner_{name}"][floors] = _of_corners(f"floor_{name}", of, values)
+    return {
+        **{name: of[name] for name in ("node_acceleration", "node_displacement", "drift", "storey_shear")},
+        **corners,
+        "corner_drift": _of_corners("corner", of, values),
+        "storey_torsion": of["torsion"][:, 2],
+        "base_twist": of["twist"][:, 2],
+        "mean_displacement": of["mean"][0],
+        "overturning_moment": of["overturning"][0],
+        "base_reaction": of["base"][0],
+        "base_torsion": of["base_torsion"],
+        "energy": of["energy"],
+        "bearing_displacement": np.array(of_bearings("displacement")),
+        "top_force": np.array(of_bearings("force")),
+        "axial_force": np.array(of_bearings("axial")),
+        "sliding": padded(of_bearings("most sliding")),
+        "rim_force": padded(of_bearings("most rim")),
+        "lift": padded(of_bearings("least compression")),
+        "contact_offset": padded(of_bearings("contact")),
+        "temperature": padded(of_bearings("most temperature")),
+        "normal_force": np.stack([padded(of_bearings(f"{word} normal")) for word in ("least", "most")], axis=1),
+        "rims_met": np.concatenate(of_bearings("met")),
+    }
 
 
 DIMENSIONS = {

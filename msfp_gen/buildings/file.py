@@ -9,8 +9,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
+from msfp_gen.buildings.bearing import BuildingBearing
 from msfp_gen.buildings.building import Building
-from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.storey import BaseSlab, Soil, Storey
 from msfp_gen.common.aliases import SceneTable
 from msfp_gen.common.errors import InputError

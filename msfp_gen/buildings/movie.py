@@ -9,7 +9,7 @@ import numpy as np
 from msfp_gen.buildings.figures import MovingFrame, draw_axial_history, legend_above, magnification, plan_of, title_of
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
-from msfp_gen.figures.movie import TALLEST, WIDE, Film, Layout, even
+from msfp_gen.figures.movie import TALLEST, WIDE, Film, MovieLayout, even
 from msfp_gen.figures.section import STEEL, direction_of
 from msfp_gen.figures.style import BOLD, COLOURS, FAINT, HAIR, INK, LINE, THIN, displacement, headline, subscript
 from msfp_gen.results.sign import shown_sign
@@ -37,7 +37,7 @@ def building_film(result: BuildingResult, times: Array, azimuth: float | None) -
     high, wide = views[0].high - views[0].low, sum(view.right - view.left for view in views)
     tall = even(min(TALLEST, (WIDE - 1.2) * high / wide) + AROUND_FRAME + BELOW_FRAME)
 
-    def layout(figure: Figure) -> Layout:
+    def layout(figure: Figure) -> MovieLayout:
         ((above,), (below,)) = figure.subfigures(2, 1, squeeze=False, height_ratios=(tall - BELOW_FRAME, BELOW_FRAME))
         headline(above, f"{title_of(result)}: displacements from the ground, {moving.factor:g} times as large")
         row = above.subplots(1, 2, sharey=True, width_ratios=[view.right - view.left for view in views])
@@ -76,7 +76,7 @@ class Elevation:
         self.left, self.right = float(x.min()) - room, float(x.max()) + room
         self.low, self.high = float(z.min()) - 0.5 * frame.depth, float(z.max()) + room
 
-    def draw(self, axes: Axes, time: Array, timed: bool) -> Layout:
+    def draw(self, axes: Axes, time: Array, timed: bool) -> MovieLayout:
         """Draw it; returns a function that moves it to a frame, and what it changes. timed: state the time [s]."""
         ground = float(self.frame.upper_ends[:, 2].min()) - self.frame.depth
         axes.axhline(ground, color=FAINT, linewidth=THIN, zorder=0)
@@ -132,7 +132,7 @@ def _state_entries() -> list[Any]:
     return [Line2D([], [], label=f"bearing {name}", markerfacecolor=colour, **style) for name, colour in STATES.items()]
 
 
-def _draw_plan(axes: Axes, result: BuildingResult, frame: MovingFrame) -> Layout:
+def _draw_plan(axes: Axes, result: BuildingResult, frame: MovingFrame) -> MovieLayout:
     """Paths of the upper ends of the bearings in plan, with the slab above them."""
     whole = MovingFrame(result, frame.factor)
     for index in range(whole.uppers.shape[1]):
@@ -155,7 +155,7 @@ def _draw_plan(axes: Axes, result: BuildingResult, frame: MovingFrame) -> Layout
     return move, [slab, dots]
 
 
-def _draw_loops(axes: Axes, result: BuildingResult, time: Array) -> Layout:
+def _draw_loops(axes: Axes, result: BuildingResult, time: Array) -> MovieLayout:
     """Base shear over the mean displacement of the bearings, along both axes."""
     dots = []
     reach = [float(np.ptp(_mean_loop(result, axis)[0])) for axis in range(2)]
@@ -186,7 +186,7 @@ def _mean_loop(result: BuildingResult, axis: int) -> tuple[Array, Array]:
     return displacement(mean), shown_sign().factor * np.asarray(shear)
 
 
-def _draw_forces(axes: Axes, result: BuildingResult, time: Array) -> Layout:
+def _draw_forces(axes: Axes, result: BuildingResult, time: Array) -> MovieLayout:
     """Axial forces of the bearings over time, and the instant of the frame."""
     draw_axial_history(axes, result)
     axes.set_xlim(time[0], time[-1])

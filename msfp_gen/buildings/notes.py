@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from msfp_gen.buildings.bearing import BuildingBearing, standing_below
 from msfp_gen.buildings.building import Building
-from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.note import RISING, Note
 from msfp_gen.scene.fidelity import UNSEEN
@@ -22,10 +23,10 @@ from msfp_gen.scene.plausibility import (
     OF_MOTION,
     OF_RUN,
     USUAL_DAMPING,
-    Check,
     Doubt,
     Reading,
     Subject,
+    UsualRange,
     doubtful_values,
     judged,
     ringing,
@@ -206,54 +207,54 @@ def _slowest(scene: BuildingScene) -> Iterator[Reading]:
 
 
 OF_BUILDING = (
-    Check(
+    UsualRange(
         _damping,
         (-np.inf, 0.2),
         "building.damping_ratio: the first mode on a fixed base has {value:.3g} of critical damping; is it a fraction, "
         "such as 0.05 for 5 per cent?",
         (-np.inf, 1.0),
     ),
-    Check(
+    UsualRange(
         _frequency,
         (0.05, np.inf),
         "building: the lowest frequency on a fixed base is {value:.3g} Hz; are stiffnesses in N/m and N m/rad, of "
         "torsion and rocking too?",
         (0.02, np.inf),
     ),
-    Check(
+    UsualRange(
         _floor_mass,
         (LIGHT, np.inf),
         "{path}.mass = {value:g} kg is {measure:.2g} of the mean of all floors; is it in kg, not in t?",
         (0.003, np.inf),
     ),
-    Check(
+    UsualRange(
         _gyration,
         (-np.inf, 1.0),
         "{path}.inertia: about E3 the radius of gyration is {value:.3g} m, the bearings are at most {widest:.3g} m "
         "apart; is it mass times radius squared [kg m^2]?",
         (-np.inf, 10.0),
     ),
-    Check(
+    UsualRange(
         _heights,
         (-np.inf, HEIGHT),
         "{path}.height = {value:g} m is unusually high; is it in m, not in mm?",
         (-np.inf, 100.0),
     ),
-    Check(
+    UsualRange(
         _storey_drifts,
         (-np.inf, 0.05),
         f"{{path}}.stiffness: under {SHARE:g} g the storey drifts by {{measure:.0%}} of its height; is it in N/m, not "
         "in kN/m?",
         (-np.inf, 0.3),
     ),
-    Check(
+    UsualRange(
         _sag,
         (-np.inf, 0.05),
         "building.bearing[{mount}].interface.vertical_stiffness = {value:g} N/m: the building settles by {measure:.3g} "
         "m at rest; is it in N/m, not in kN/m?",
         (-np.inf, 0.5),
     ),
-    Check(
+    UsualRange(
         _slowest,
         (0.05, np.inf),
         "building: on the vertical springs of its interfaces it rocks or heaves at {value:.3g} Hz; are their "

@@ -35,7 +35,7 @@ TERMS = (
 )  # fmt: skip
 
 
-def scale_of(result: BuildingResult) -> int:
+def magnification(result: BuildingResult) -> int:
     """The magnification with which the view opens: displacements are seen and bearings stay apart."""
     peak = max(bearing.summary["peak_displacement"]["radial"] for bearing in result.bearings)
     wanted = SHOWN * size_of(result.scene) / peak if peak > 0 else 1.0
@@ -44,7 +44,7 @@ def scale_of(result: BuildingResult) -> int:
 
 def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
     """Data for the scripts, ready for JSON: lengths [m], forces [N], accelerations [m/s^2], axes E1, E2, E3."""
-    scene, rows, scale = result.scene, building_rows(result, count), scale_of(result)
+    scene, rows, scale = result.scene, building_rows(result, count), magnification(result)
     nodes = [result.node(node.name)[rows] for node in scene.building.nodes]
     motion = np.stack([node[:, 0] for node in nodes], axis=1)
     motion[..., :3] -= result.ground[rows, None, 0]

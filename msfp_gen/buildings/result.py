@@ -18,7 +18,7 @@ from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.spectra import FloorSpectra, Steps, floor_spectra, kept_spectra
 from msfp_gen.buildings.summary import BuildingCharacterisation
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.tables import Rows, Table
+from msfp_gen.common.tables import LabelledValues, Table
 from msfp_gen.results.files import Storage
 from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Extremes, by_axis
 from msfp_gen.results.joining import at_times
@@ -323,7 +323,7 @@ class BuildingResult(AnyResult):
             )
         return rows
 
-    def main_results(self) -> Rows:
+    def main_results(self) -> LabelledValues:
         """Label and value of the main results."""
         s = self.summary
         displacement, force = s["peak_displacement"], s["peak_force"]
@@ -347,7 +347,7 @@ class BuildingResult(AnyResult):
         x, y = bearing.history.displacement[:, :2].T
         return Curve(x, y, f"orbit of {bearing.label}")
 
-    def work_rows(self) -> Rows:
+    def work_rows(self) -> LabelledValues:
         """Label and value of the energies, the twist and the overturning moment."""
         return summaries.work_rows(self.summary)
 

@@ -12,9 +12,10 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
+from msfp_gen.buildings.effects import EffectRequest
 from msfp_gen.buildings.extremes import BuildingExtremes, lift_of, padded, temperature_of, vectors
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.scene import BuildingScene, EffectRequest
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.spectra import Steps
 from msfp_gen.buildings.storey import FREEDOMS
 from msfp_gen.common.arrays import Array, parts
@@ -22,7 +23,7 @@ from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.errors import InputError, RunError, prefixed
 from msfp_gen.embedding.two_port import DISSIPATED, compiled_port, scene_at_rest
 from msfp_gen.jit.build import load_driver
-from msfp_gen.model.compiled import AnyRun, Port
+from msfp_gen.model.compiled import CompiledRun, Port
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.time_grid import TimeGrid, snapped
@@ -71,7 +72,7 @@ KEPT = (*OF_SURFACES, *STORED, "work")
 
 
 @dataclass(frozen=True, eq=False)
-class Member:
+class RunningBearing:
     """A bearing in a run.
 
     request: input that decides its effects. effects: of its model. rest: the scene of the bearing at rest between its
@@ -136,7 +137,7 @@ class Member:
         """How it ended with its model."""
         return Ending(self.effects, status, self.port.time, surface, value, self.port.trips)
 
-    def continue_from(self, other: Member, ends: Array) -> None:
+    def continue_from(self, other: RunningBearing, ends: Array) -> None:
         """Enter the state of another model of the same bearing; ends: their motion in it, shape (2, 3, 6)."""
         at = RestartState.of_port(other.port)
         parts = (self.rest.bearing, self.rest.top, self.model, at)
@@ -151,7 +152,7 @@ BEARINGS_OF_A_THREAD = 8  # fewer are not worth a thread
 MOTIONS, ENERGIES = ("displacement", "velocity", "acceleration"), ("damped", "received", "input")
 
 
-class CompiledRun(AnyRun, Protocol):
+class CompiledBuildingRun(CompiledRun, Protocol):
     """`Run` of `compiled/msfp_building.pyx`."""
 
     @property
@@ -188,9 +189,9 @@ class BuildingRun:
     in order.
     """
 
-    run: CompiledRun
+    run: CompiledBuildingRun
     scene: BuildingScene
-    members: list[Member]
+    members: list[RunningBearing]
     grounds: list[Motion]
     build: str
     changes: list[Change] = field(default_factory=list)
@@ -207,7 +208,7 @@ class BuildingRun:
         return self.run.status[0]
 
     def begin(self) -> None:
-        """Nothing: the run has one segment, which `start_run` makes."""
+        """Nothing: the run has one segment, which `start_building_run` makes."""
 
     def advance(self) -> bool:
         """Take some steps, where needed with other models of bearings."""
@@ -230,7 +231,7 @@ class BuildingRun:
         ended = [member.model.spec for member in self.members]
         models = dict.fromkeys([_models(self.scene.every_spec), _models(ended)])
         about = provenance_of(self.scene.solver, ", then ".join(models))
-        return replace(result_of(self), provenance=about, status=status, message=message, wall_time=wall)
+        return replace(building_result(self), provenance=about, status=status, message=message, wall_time=wall)
 
     @property
     def extremes(self) -> BuildingExtremes:
@@ -248,7 +249,7 @@ class BuildingRun:
             self._repeat(Change.of_table(table))
         self.run.restore(state)
 
-    def replace(self, member: Member, change: Change) -> None:
+    def replace(self, member: RunningBearing, change: Change) -> None:
         """Put a member in place of the one of an earlier model."""
         self.members[change.bearing] = member
         self.changes.append(change)
@@ -274,7 +275,7 @@ class BuildingRun:
             effects = {name: now for name, (before, now) in values.items() if now != before}
             rows, work = self.run.row_count, member.work
             work = work + earlier_work(self.changes, index, (rows + 1, len(work)))[-1]
-            new = Member.of(self.scene, index, after)
+            new = RunningBearing.of(self.scene, index, after)
             new.continue_from(member, self.run.ends(index))
             notes = tuple(monitor_notes(ending, after))
             self.replace(new, Change(index, effects, rows, work.tolist(), new.model.info.key, notes))
@@ -296,19 +297,19 @@ class BuildingRun:
         if not 0 <= change.bearing < len(self.members):
             raise ValueError("a change of models of no bearing")
         effects = replace(self.members[change.bearing].effects, **change.effects)
-        member = Member.of(self.scene, change.bearing, effects)
+        member = RunningBearing.of(self.scene, change.bearing, effects)
         if member.model.info.key != change.build:
             raise ValueError("made by another build of a model")
         self.replace(member, change)
 
 
-def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
+def start_building_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
     """The run of a scene before its first step.
 
     threads: for the bearings; None: as many as there are processors, with eight bearings each, while that is faster
     than one by the clock. Results do not depend on it. Raises InputError, RunError.
     """
-    members = [Member.of(scene, index, effects) for index, effects in enumerate(scene.modelled)]
+    members = [RunningBearing.of(scene, index, effects) for index, effects in enumerate(scene.modelled)]
     grounds, ground_of = scene.grounds
     building, solver = scene.building, scene.solver
     grid = TimeGrid.of_histories(grounds, scene.end, (solver.max_step, *(ground.max_step for ground in grounds)))
@@ -316,7 +317,7 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
     orders, watched, shares = vectors(scene)
     pieces = [snapped(ground.knots, ground.coefficients, grid.stops) for ground in grounds]
     module, key = load_driver("msfp_gen.buildings")
-    run: CompiledRun = module.Run(
+    run: CompiledBuildingRun = module.Run(
         (same.mass, same.damping, same.stiffness),
         same.shares,
         same.dampers,
@@ -364,7 +365,7 @@ def unpacked(run: BuildingRun) -> dict[str, Array]:
     return rows
 
 
-def result_of(run: BuildingRun) -> BuildingResult:
+def building_result(run: BuildingRun) -> BuildingResult:
     """The rows of a run until now."""
     rows, bearings, count = unpacked(run), run.scene.every_bearing, len(run.members)
     works = [dict(zip(names(WORKS), rows[f"work {i}"].T, strict=True)) for i in range(count)]

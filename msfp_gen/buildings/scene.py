@@ -1,6 +1,6 @@
 """`BuildingScene`: the input of a run: a building, its bearings and the motion of the ground.
 
-Loads at rest, vertical modes and the selected effects of each bearing follow from it.
+Loads at rest and vertical modes follow from it; `effects.py` selects the effects of each bearing.
 """
 
 from __future__ import annotations
@@ -12,93 +12,34 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from msfp_gen.buildings.bearing import BuildingBearing, standing_below
 from msfp_gen.buildings.building import Building
+from msfp_gen.buildings.effects import EffectRequest, effect_selections
 from msfp_gen.buildings.storey import Node
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
 from msfp_gen.common.identity import NO_NUMBERS
-from msfp_gen.common.tables import Printed, Rows, Table
+from msfp_gen.common.tables import LabelledValues, Printed, Table
 from msfp_gen.motions.motion import Motion
-from msfp_gen.results.quantities import Source
+from msfp_gen.results.quantities import ColumnSource
 from msfp_gen.results.variables import Places
 from msfp_gen.scene.bearing import Bearing
-from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
+from msfp_gen.scene.effect_selection import EffectSelection
 from msfp_gen.scene.effect_switching import with_monitored
-from msfp_gen.scene.friction_parameters import bearing_for, select_friction
+from msfp_gen.scene.friction_parameters import bearing_for
 from msfp_gen.scene.scene import effects_named
 from msfp_gen.scene.scene_fields import Fidelity, Limits
 from msfp_gen.scene.solver import Solver
-from msfp_gen.scene.standing import check_seats, check_standing, needed_rotational_stiffness
+from msfp_gen.scene.standing import check_seats, check_standing
 from msfp_gen.scene.system import OtherSystem
-from msfp_gen.scene.top import NodeTop
-from msfp_gen.specification.friction_laws import Law, law_of
+from msfp_gen.specification.friction_laws import Law
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
 BALANCE = 1e-6  # part of the weight that the bearings do not balance at rest, at most
 ROW_STEP = 0.01  # time between rows [s]
-LEAST_SHARE = 0.1  # estimated least load over the load at rest, above which uplift is left out
-STEP = 5e-3  # of the linear response [s]
-SMALL = 1e-12  # relative excitation below which vertical motion does not excite a mode
 APART = 1e-3  # least distance between the axes of two bearings [m]
 REST = 1e-9  # largest velocity of the ground at the start [m/s]
-
-
-@dataclass(frozen=True)
-class BuildingBearing:
-    """A bearing of a building.
-
-    bearing: values, which several bearings of a building may share. interface: `Top.node(...)`, the joint: stiffness
-    and damping between top plate and building. position: in plan [m]; None: the position of the node, for a floor its
-    centre of mass. node: of the building; a rigid link connects the bearing to it. effects: of the model; `Auto` or
-    None: selected from the scene. name: for messages and results. motion: of the ground below the bearing; None: of the
-    scene. Raises InputError.
-    """
-
-    bearing: Bearing
-    interface: NodeTop
-    position: Annotated[tuple[float, float] | None, Quantity("m", shape=(2,))] = None
-    node: str = "base"
-    effects: Effects | Auto | None = None
-    name: str = ""
-    motion: Motion | None = None
-
-    def __post_init__(self) -> None:
-        require_type(self.bearing, Bearing, "building_bearing.bearing")
-        require_type(self.motion, (Motion, type(None)), "building_bearing.motion")
-        require_type(self.interface, NodeTop, "building_bearing.interface")
-        require_type(self.effects, (Effects, Auto, type(None)), "building_bearing.effects")
-        check_fields(self, "building_bearing")
-        for name, needed in (("dimension", "spatial"), ("spin", "locked")):
-            if (value := getattr(self.effects, name, None)) not in (None, needed):
-                raise InputError(
-                    f"building_bearing.effects.{name} = {value!r}: a building moves its bearings in space and twists "
-                    f"none of them; give {needed!r}"
-                )
-
-    @property
-    def law(self) -> Law | None:
-        """The friction law at the start of a run; None: friction is constant."""
-        requested = self.effects or Auto()
-        formula = requested.friction_law
-        return law_of(requested.friction or select_friction(self.bearing, formula), formula)
-
-
-def standing_below(mount: BuildingBearing, load: float) -> tuple[float, float, float]:
-    """Rotational stiffness of an interface [N m/rad], the stiffness that its plate needs [N m/rad], and the load [N].
-
-    For the checks of `scene/standing.py`. The building holds no plate at its place but follows it sideways.
-    """
-    weight = float(load)
-    return mount.interface.rotational_stiffness, needed_rotational_stiffness(mount.bearing, weight, 0.0), weight
-
-
-class EffectRequest(NamedTuple):
-    """The input that decides the effects of a bearing: see `effect_switching.Requested`."""
-
-    effects: Effects | Auto
-    solver: Solver
-    end: float
 
 
 class VerticalModes(NamedTuple):
@@ -293,13 +234,7 @@ class BuildingScene(Printed, OtherSystem):
     @cached_property
     def effect_selections(self) -> tuple[EffectSelection, ...]:
         """The effects of every bearing, with the reason for each that is selected. Raises InputError."""
-        if all(isinstance(mount.effects, Effects) for mount in self.bearings):
-            remaining: list[float] = [0.0] * len(self.bearings)  # nothing is selected
-        elif len(set(self.grounds[1])) > 1:
-            remaining = [-np.inf] * len(self.bearings)  # the estimate has one motion of the ground
-        else:
-            remaining = remaining_loads(self).tolist()
-        return tuple(_selected(self, index, share) for index, share in enumerate(remaining))
+        return effect_selections(self)
 
     @property
     def modelled(self) -> tuple[Effects, ...]:
@@ -330,9 +265,9 @@ class BuildingScene(Printed, OtherSystem):
 
     def start(self, **options: Any) -> Any:
         """The run before its first step; see `simulation.system.start`."""
-        from msfp_gen.buildings.run import start_run
+        from msfp_gen.buildings.run import start_building_run
 
-        return start_run(self, **options)
+        return start_building_run(self, **options)
 
     def text(self) -> str:
         """The scene as text; see `scene.file.loader.scene_text`."""
@@ -359,13 +294,13 @@ class BuildingScene(Printed, OtherSystem):
 
         return structure(self, given)
 
-    def quantities(self) -> dict[str, Source]:
+    def quantities(self) -> dict[str, ColumnSource]:
         """What tables report of a run; see `results.quantities.quantities`."""
         from msfp_gen.buildings.quantities import quantities
 
         return quantities(self)
 
-    def printed_rows(self) -> tuple[str, Rows]:
+    def printed_rows(self) -> tuple[str, LabelledValues]:
         """The parts in a few rows."""
         layouts = ", ".join(dict.fromkeys(bearing.layout.name for bearing in self.every_bearing))
         parts = {
@@ -520,90 +455,3 @@ class BuildingScene(Printed, OtherSystem):
                     f"{field} lasts {motion.duration:.12g} s, the run {self.end:.12g} s; give at most that as "
                     "scene.duration, or motion.held(...)"
                 )
-
-
-def _selected(scene: BuildingScene, index: int, remaining: float) -> EffectSelection:
-    """The effects of a bearing by its index, with reasons. remaining: see `remaining_loads`. Raises InputError."""
-    mount = scene.bearings[index]
-    requested = Auto() if mount.effects is None else mount.effects
-    if isinstance(requested, Effects):
-        return EffectSelection(requested)
-    reasons = tuple(
-        Reason(reason.effect, value, GIVEN) if (value := getattr(requested, reason.effect)) is not None else reason
-        for reason in _reasons(mount.bearing, requested, remaining)
-    )
-    with prefixed(f"scene.bearings[{index}]."):
-        effects = requested.resolve(**{reason.effect: reason.chosen for reason in reasons})
-    return EffectSelection(effects, reasons, error=requested.error)
-
-
-def _reasons(bearing: Bearing, requested: Auto, remaining: float) -> tuple[Reason, ...]:
-    """The choice and reason of every effect. remaining: see `remaining_loads`; -inf: not known."""
-    capacity = min(surface.capacity for surface in bearing.surfaces)
-    friction = select_friction(bearing, requested.friction_law)
-    lifts = remaining <= LEAST_SHARE and requested.sliders != "massless"
-    why = f"about {max(remaining, 0.0):.0%} of the load at rest remains"
-    if remaining == -np.inf:
-        why = "the ground moves differently below some bearings, which may take the load off others"
-    saves = "" if lifts else f"{3 * bearing.layout.surfaces} unknown separations"
-    return (
-        Reason("dimension", "spatial", "the building moves a bearing in space"),
-        Reason("sliders", "inertial", "quasi-static steps need motion in one vertical plane"),
-        Reason("rims", True, f"nothing limits sliding under a building; the least capacity is {1e3 * capacity:.4g} mm"),
-        Reason("uplift", lifts, why, saves),
-        Reason("friction", friction, "the parameters that its surfaces have"),
-    )
-
-
-def remaining_loads(scene: BuildingScene) -> Array:
-    """An estimate of the least axial load of every bearing over its load at rest, ndarray, shape (bearings,), [-].
-
-    The ground moves everywhere as below the first bearing. The load changes by the vertical response of the linear
-    building on the springs of its interfaces, and by overturning as a rigid body under the horizontal force of the
-    bearings: all surfaces slide, at the largest distance of the ground from its start.
-    """
-    times = np.arange(0.0, scene.end, STEP)
-    path = scene.first_ground.displacement(times)[:, :2]
-    overturning = _overturning(scene, float(np.linalg.norm(path - path[0], axis=1).max()))
-    ratios: Array = 1.0 + (_vertical_response(scene, times).min(axis=0) - overturning) / scene.axial_loads
-    return ratios
-
-
-def _vertical_response(scene: BuildingScene, times: Array) -> Array:
-    """Change of the axial loads under the vertical motion of the ground, shape (times, bearings) [N]."""
-    # By superposition of modes, without the coupling by damping; exact for an acceleration that is linear in a step.
-    from scipy.signal import cont2discrete, lfilter
-
-    building, rows = scene.building, scene.attachments[:, 2]
-    springs = np.array([mount.interface.vertical_stiffness for mount in scene.bearings])
-    dampers = np.array([mount.interface.vertical_damping for mount in scene.bearings])
-    squares, modes, rates, _ = scene.vertical_modes
-    modal_forces = -modes.T @ building.mass @ building.rigid_motions[:, 2]
-    ground = scene.first_ground.acceleration(times)[:, 2]
-    loads = np.zeros((len(times), len(rows)))
-    for mode, square, rate, force in zip(modes.T, squares, rates, modal_forces, strict=True):
-        along = rows @ mode
-        if abs(force) * np.abs(along).max() < SMALL * np.abs(building.mass @ mode).max():
-            continue
-        for weight, numerator in ((springs, [force]), (dampers, [force, 0.0])):
-            above, below, _ = cont2discrete((numerator, [1.0, rate, square]), STEP, "foh")
-            loads -= np.outer(lfilter(above[0], below, ground), weight * along)
-    return loads
-
-
-def _overturning(scene: BuildingScene, distance: float) -> Array:
-    """Largest change of the axial loads by overturning, shape (bearings,) [N]. distance: of the ground [m]."""
-    ratio = max(  # horizontal force over load, where all surfaces of a bearing slide
-        max(surface.friction for surface in bearing.surfaces)
-        + distance / sum(surface.radius for surface in bearing.surfaces)
-        for bearing in scene.every_bearing
-    )
-    motions = scene.building.rigid_motions
-    moment = ratio * scene.gravity * float(np.abs((motions.T @ scene.building.mass @ motions)[0, 4]))
-    springs = np.array([mount.interface.vertical_stiffness for mount in scene.bearings])
-    arms = scene.attachments[:, 2] @ motions[:, 3:5]
-    arms -= springs @ arms / springs.sum()
-    rocking = springs @ arms**2
-    changes = np.divide(moment * springs[:, None] * arms, rocking, where=rocking > 0, out=np.zeros_like(arms))
-    largest: Array = np.hypot(*changes.T)
-    return largest

@@ -14,7 +14,7 @@ from msfp_gen.results.history import by_axis
 from msfp_gen.results.loops import ForcePath, rests
 from msfp_gen.results.summary import ratios_text, summary_of_run
 
-Columns = dict[str, tuple[str, str, float, str]]
+ColumnFormats = dict[str, tuple[str, str, float, str]]
 
 
 def summarise(result: Any) -> dict[str, Any]:
@@ -141,7 +141,7 @@ def _energy(energy: Mapping[str, float]) -> str:
 
 
 # Column -> (key of a floor, component of its value, scale, format).
-NODES: Columns = {
+NODES: ColumnFormats = {
     "floor": ("name", "", 1, ""),
     "z [m]": ("height", "", 1, "g"),
     "a1 [m/s^2]": ("peak_acceleration", "E1", 1, ".3f"),
@@ -152,12 +152,12 @@ NODES: Columns = {
     "u2": ("peak_displacement", "E2", 1e3, ".1f"),
     "u": ("peak_displacement", "radial", 1e3, ".1f"),
 }
-CORNERS: Columns = {  # as NODES, at the corners of the plan
+CORNERS: ColumnFormats = {  # as NODES, at the corners of the plan
     "corner a": ("peak_corner_acceleration", "radial", 1, ".3f"),
     "corner a3": ("peak_corner_acceleration", "E3", 1, ".3f"),
     "corner u": ("peak_corner_displacement", "radial", 1e3, ".1f"),
 }
-STOREYS: Columns = {  # as NODES, of a storey
+STOREYS: ColumnFormats = {  # as NODES, of a storey
     "storey": ("name", "", 1, ""),
     "drift 1 [mm]": ("peak_drift", "E1", 1e3, ".2f"),
     "drift 2": ("peak_drift", "E2", 1e3, ".2f"),
@@ -169,7 +169,7 @@ STOREYS: Columns = {  # as NODES, of a storey
 }
 
 
-def _upwards(title: str, columns: Columns, parts: Sequence[Mapping[str, Any]]) -> Table:
+def _upwards(title: str, columns: ColumnFormats, parts: Sequence[Mapping[str, Any]]) -> Table:
     """A table of floors or storeys, the highest first."""
     rows = [
         [format((part[key][of] if of else part[key]) * scale, style) for key, of, scale, style in columns.values()]

@@ -12,10 +12,10 @@ import typer
 from msfp_gen.cli.console import (
     AsJson,
     Force,
-    Progress,
     SceneName,
+    ShownProgress,
     SignOption,
-    Workers,
+    WorkersOption,
     answer,
     build,
     interruptible,
@@ -53,7 +53,7 @@ def characterise(
 ) -> None:
     """State stiffness, damping, sliding regimes, capacity left, velocity and heat of a run, with envelopes."""
     from msfp_gen.common.output import check_output
-    from msfp_gen.results.characterise import CSV_SUFFIXES, write_csv
+    from msfp_gen.results.characterise import CSV_SUFFIXES, write_characterisation
 
     if output is not None:
         check_output(output, CSV_SUFFIXES, "--output")
@@ -63,7 +63,7 @@ def characterise(
     characterisation = result.characterise()
     answer(characterisation.as_dict(), characterisation.tables(), as_json)
     if output is not None:
-        note(f"wrote {write_csv(characterisation, output)}")
+        note(f"wrote {write_characterisation(characterisation, output)}")
 
 
 @app.command(
@@ -94,7 +94,7 @@ def bound(
         list[str] | None,
         typer.Option(metavar="RECORD", help="A record of the suite that is not run and in no mean; may be repeated."),
     ] = None,
-    workers: Workers = None,
+    workers: WorkersOption = None,
     sign: SignOption = DEFAULT,
     force: Force = False,
     as_json: AsJson = False,
@@ -123,7 +123,7 @@ def bound(
     if output is not None:
         make_folder(output, "--output")
     build(chosen)
-    with Progress("3 cases") as progress:
+    with ShownProgress("3 cases") as progress:
         bounds = module.bound(chosen, table, force=force, progress=progress)
     answer(bounds.as_dict(), module.bounding_tables(bounds), as_json)
     if output is not None:
@@ -170,7 +170,7 @@ def _bound_suite(
     from msfp_gen.studies.bounding import suite as module
 
     chosen = factors_of(load_scene(scene)).name if factors is None else factors
-    with Progress("suite") as progress:
+    with ShownProgress("suite") as progress:
         study = module.suite_study(scene, suite, chosen, progress)
     module.check_left_out(leave_out, study)
     scenes = module.suite_scenes(study, leave_out)
@@ -180,7 +180,7 @@ def _bound_suite(
         make_folder(output, "--output")
     build(study.scene(1))
     count = len(study.inputs.records) - len(set(leave_out))
-    with interruptible(output), Progress(f"{count} record{'s' * (count > 1)} at their bounds") as update:
+    with interruptible(output), ShownProgress(f"{count} record{'s' * (count > 1)} at their bounds") as update:
         bounds = module.bound_suite(  # force: values have been judged
             study, output, leave_out=leave_out, workers=workers, force=True, progress=update
         )
@@ -265,7 +265,7 @@ def fit(
     for fitted_scene in prepared.scenes:
         build(fitted_scene, gradients=True)
         build(fitted_scene)  # tighter runs at the end have no derivatives
-    line = Progress("fit")
+    line = ShownProgress("fit")
     with line as update:
 
         def show_evaluation(count: int, share: float, deviation: float) -> None:

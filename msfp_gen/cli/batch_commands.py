@@ -14,10 +14,10 @@ import typer
 
 from msfp_gen.cli.console import (
     Force,
-    Progress,
     SceneName,
+    ShownProgress,
     SignOption,
-    Workers,
+    WorkersOption,
     answer,
     note,
     note_doubts,
@@ -36,7 +36,7 @@ from msfp_gen.results.sign import DEFAULT, sign_of, using_sign
 
 if TYPE_CHECKING:
     from msfp_gen.scene.system import System
-    from msfp_gen.studies.accuracy.study import Study
+    from msfp_gen.studies.accuracy.study import ErrorStudy
     from msfp_gen.studies.sweep import Row, Variation
 
 app = typer.Typer()
@@ -70,7 +70,7 @@ def batch(
         Path | None,
         typer.Option(metavar="FILE", help="Write one row for each run, varied fields included: .csv or .parquet."),
     ] = None,
-    workers: Workers = None,
+    workers: WorkersOption = None,
     sign: SignOption = DEFAULT,
     force: Force = False,
     as_json: Annotated[
@@ -87,7 +87,7 @@ def batch(
     if table is not None:
         check_output(table, TABLE_SUFFIXES, "--table")
     fields = [varied_field(text) for text in vary or ()]
-    with Progress("suite") as progress:
+    with ShownProgress("suite") as progress:
         loaded = None if suite is None else load_suite(suite, progress)
     records, target = ((), None) if loaded is None else (loaded.records, loaded.target)
     chosen = [variation for source in sources for variation in variations(source, fields, records)]
@@ -111,7 +111,7 @@ def _run(chosen: Sequence[Variation], workers: int | None, folder: Path | None, 
     started = completed_runs([variation.scene for variation in chosen], workers)
     if folder is not None:
         make_folder(folder, "--output")
-    with Progress(f"{len(chosen)} scenes") as progress, closing(started) as runs:
+    with ShownProgress(f"{len(chosen)} scenes") as progress, closing(started) as runs:
         for index, result in runs:
             file = None
             if folder is not None and not isinstance(result, RunError):
@@ -163,11 +163,11 @@ app.add_typer(bench, name="bench")
 Tolerances = Annotated[
     str | None, typer.Option(metavar="LIST", help="Tolerances, such as 1e-2,1e-4, instead of the default list.")
 ]
-Limit = Annotated[float, typer.Option(parser=number, metavar="SECONDS", help="Cut off a run after this wall time.")]
+TimeLimit = Annotated[float, typer.Option(parser=number, metavar="SECONDS", help="Cut off a run after this wall time.")]
 Duration = Annotated[
     float | None, typer.Option(parser=number, metavar="SECONDS", help="End the scene after this simulated time.")
 ]
-Folder = Annotated[
+OutputFolder = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="DIR", help="Write CSV, JSON, Markdown, SVG and PNG to this folder."),
 ]
@@ -185,9 +185,9 @@ def work_precision(
         str | None, typer.Option(metavar="LIST", help="Methods, such as implicit,dopri5, instead of all.")
     ] = None,
     tolerances: Tolerances = None,
-    limit: Limit = 10.0,
+    limit: TimeLimit = 10.0,
     duration: Duration = None,
-    output: Folder = None,
+    output: OutputFolder = None,
     as_json: AsJson = False,
     force: Force = False,
 ) -> None:
@@ -209,9 +209,9 @@ def work_precision(
 def model_error(
     scene: SceneName,
     tolerances: Tolerances = None,
-    limit: Limit = 10.0,
+    limit: TimeLimit = 10.0,
     duration: Duration = None,
-    output: Folder = None,
+    output: OutputFolder = None,
     as_json: AsJson = False,
     force: Force = False,
 ) -> None:
@@ -224,7 +224,12 @@ def model_error(
 
 
 def _report(
-    name: str, duration: float | None, folder: Path | None, as_json: bool, force: bool, study: Callable[[System], Study]
+    name: str,
+    duration: float | None,
+    folder: Path | None,
+    as_json: bool,
+    force: bool,
+    study: Callable[[System], ErrorStudy],
 ) -> None:
     """Load the scene, run the study, print it and write its files."""
     from msfp_gen.common.output import make_folder

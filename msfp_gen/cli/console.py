@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 
-from msfp_gen.common.errors import InputError, RunError, printable
+from msfp_gen.common.errors import RunError, printable
 from msfp_gen.common.fields import Choice, Rule, ruled_fields
 from msfp_gen.results.sign import SIGNS
+from msfp_gen.scene.system import require_field
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def _option(name: str, rule: Rule) -> Any:
 whole_number, number = parser_of(int, "whole number"), parser_of(float, "number")
 numbers = parser_of(lambda text: tuple(map(float, text.split(","))), "list of numbers")
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")]
-Workers = Annotated[
+WorkersOption = Annotated[
     int | None,
     typer.Option(parser=whole_number, metavar="NUMBER", help="Runs at the same time; default: one for each core."),
 ]
@@ -187,7 +188,7 @@ def interruptible(output: Path | None) -> Iterator[None]:
         raise
 
 
-class Progress:
+class ShownProgress:
     """Progress in per cent, which never falls, and after a second the time left.
 
     On a terminal it is one line; elsewhere there is a line every `EVERY` seconds. terminal: which of the two.
@@ -238,7 +239,7 @@ def building(kept: bool = True) -> Iterator[Callable[[str, float], None]]:
 
     kept: whether the cache keeps what is built.
     """
-    task, line, begin = "", Progress(""), monotonic()
+    task, line, begin = "", ShownProgress(""), monotonic()
 
     def report(doing: str, share: float) -> None:
         nonlocal task
@@ -288,8 +289,7 @@ Force = Annotated[bool, typer.Option("--force", help="Run also with values that 
 
 def with_field(scene: Any, name: str, change: Callable[[Any], Any]) -> Any:
     """A scene with a field changed by options. change: of its value. Raises InputError where there is no such field."""
-    if name not in scene.__dataclass_fields__:
-        raise InputError(f"{scene.name}: this system has no field {name}; leave out the options that change it")
+    require_field(scene, name, "leave out the options that change it")
     return replace(scene, **{name: change(getattr(scene, name))})
 
 
@@ -305,7 +305,7 @@ def run_scene(scene: Any, force: bool = False, **options: Any) -> tuple[Any, Run
     require_meant(scene, force=force)
     require_memory([scene])
     build(scene)
-    with Progress(scene.name or "run") as progress:
+    with ShownProgress(scene.name or "run") as progress:
         try:
             return simulate(scene, progress=progress, **options), None
         except RunError as error:

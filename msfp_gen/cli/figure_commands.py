@@ -10,7 +10,7 @@ import typer
 
 from msfp_gen.cli.console import (
     Force,
-    Progress,
+    ShownProgress,
     SignOption,
     is_result,
     load_source,
@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 EVERY = "all"
 
 app = typer.Typer()
-Source = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, the name of a preset, or a result (.nc).")]
+SceneOrResult = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A scene file, the name of a preset, or a result (.nc).")
+]
 Azimuth = Annotated[
     float | None,
     typer.Option(
@@ -50,7 +52,7 @@ Azimuth = Annotated[
     "  msfp-gen plot out.nc --figure section --time 90 --friction-circles -o section.svg"
 )
 def plot(
-    source: Source,
+    source: SceneOrResult,
     figure: Annotated[
         str,
         typer.Option(
@@ -106,7 +108,7 @@ def plot(
     "  msfp-gen animate hospital-clc --start 5 --end 15 -o hospital.gif"
 )
 def animate(
-    source: Source,
+    source: SceneOrResult,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="A .gif, or an .mp4 by ffmpeg.")],
     seconds: Annotated[float, typer.Option(parser=number, metavar="SECONDS", help="Length of the movie.")] = 8.0,
     rate: Annotated[int, typer.Option(parser=whole_number, metavar="NUMBER", help="Frames a second.")] = 12,
@@ -131,7 +133,7 @@ def animate(
     sign_of(sign, "--sign")
     result, failure = result_of(_load_for_figures(source), force)
     angle = None if azimuth is None else math.radians(azimuth)
-    with Progress("frames") as progress, using_sign(sign):
+    with ShownProgress("frames") as progress, using_sign(sign):
         write_movie(
             result,
             output,
@@ -242,7 +244,7 @@ def report(
     title = TitleBlock(project, device, date, revision, code, author, checker)
     sign_of(sign, "--sign")
     if is_suite_folder(source):
-        with Progress("runs made again") as progress, using_sign(sign):
+        with ShownProgress("runs made again") as progress, using_sign(sign):
             write_analysis(source, path, title, leave_out or (), loops=not no_runs, progress=progress)
         note(f"wrote {path}")
         return
@@ -250,7 +252,7 @@ def report(
         option = "--leave-out" if leave_out else "--no-runs"
         raise InputError(f"{option}: it is for the report of a suite; give the folder of `bound --suite FILE -o DIR`")
     result, failure = result_of(load_source(source), force)
-    with Progress("report") as progress, using_sign(sign):
+    with ShownProgress("report") as progress, using_sign(sign):
         write_report(result, path, count, progress, title)
     note(f"wrote {path}")
     note_exceeded({"": result.verdict})
@@ -284,6 +286,6 @@ def explore(
     if first is not None:
         require_meant(first, force=force)
     sign_of(sign, "--sign")
-    with Progress("explorer") as progress, using_sign(sign):
+    with ShownProgress("explorer") as progress, using_sign(sign):
         write_explorer(path, first, progress)
     note(f"wrote {path}")

@@ -135,9 +135,9 @@ def explain(
 def presets() -> None:
     """List the scenes, buildings and bearings that come with msfp-gen."""
     from msfp_gen.common.tables import Table
-    from msfp_gen.scene.file.catalogue import descriptions, words
+    from msfp_gen.scene.file.catalogue import descriptions, words_of_presets
 
-    bearing, *systems = words()
+    bearing, *systems = words_of_presets()
     show(Table(f"preset {word}s", (), list(descriptions(word).items())) for word in (*systems, bearing))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, note_doubts, note_written, number, show
+from msfp_gen.cli.console import ShownProgress, note, note_doubts, note_written, number, show
 from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 
@@ -127,7 +127,7 @@ def suite(
     from msfp_gen.scene.file.loader import load_suite
     from msfp_gen.scene.plausibility import motion_doubts, target_doubts
 
-    with Progress("spectra") as progress:
+    with ShownProgress("spectra") as progress:
         loaded = load_suite(file, progress)
     if spectrum is not None and (loaded.scaled is None or len(loaded.scaled.period) == 1):
         raise InputError(f"--spectrum: {file} has no [scale_to] with sds, sd1 and between; give one")
@@ -172,7 +172,7 @@ def _prepared(
     """The corrected record and its scale factor."""
     from msfp_gen.motions.records import prepared
 
-    with Progress("scale") as progress:
+    with ShownProgress("scale") as progress:
         return prepared(raw, 1.0, target, start, duration, correct, 0.05 if corner is None else corner, 1.0, progress)
 
 
@@ -186,7 +186,7 @@ def _write_spectrum(raw: Record, motion: Record | Corrected, target: ScaleTo | N
     from msfp_gen.motions.records import response_spectrum
     from msfp_gen.motions.records.spectrum import MEASURES
 
-    with Progress("spectrum") as progress:
+    with ShownProgress("spectrum") as progress:
         spectrum = response_spectrum(motion, progress=progress)
     if path.suffix.lower() == ".csv":
         spectrum.to_csv(path)

@@ -14,8 +14,8 @@ import typer
 from msfp_gen.cli.console import (
     Force,
     Output,
-    Progress,
     SceneName,
+    ShownProgress,
     SignOption,
     build,
     choices_of,
@@ -165,7 +165,7 @@ class ErrorTarget:
 
         for needed in (scene, scene.with_all_effects()):  # of the run, and of its reference run
             build(needed)
-        with Progress(scene.name or "run") as progress:
+        with ShownProgress(scene.name or "run") as progress:
             return simulate_within(scene, self.error, budget=self.budget, explain=self.explain, progress=progress)
 
 

@@ -14,8 +14,8 @@ from typer.core import TyperGroup
 from msfp_gen.cli.console import (
     AsJson,
     Force,
-    Progress,
-    Workers,
+    ShownProgress,
+    WorkersOption,
     answer,
     interruptible,
     note,
@@ -61,8 +61,8 @@ app.add_typer(
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a study.")]
 Measure = Annotated[str, typer.Option(metavar="COLUMN", help="The intensity measure.")]
 Demand = Annotated[str, typer.Option(metavar="COLUMN", help="The demand.")]
-Quantity = Annotated[str, typer.Option(metavar="COLUMN", help="The quantity.")]
-Statistic = Annotated[str, typer.Option(metavar="median|mean|max|min", help="Over the runs of one sample.")]
+QuantityColumn = Annotated[str, typer.Option(metavar="COLUMN", help="The quantity.")]
+StatisticWord = Annotated[str, typer.Option(metavar="median|mean|max|min", help="Over the runs of one sample.")]
 Level = Annotated[float, typer.Option(parser=number, metavar="SHARE", help="Confidence of intervals and bands.")]
 Where = Annotated[
     list[str] | None,
@@ -88,7 +88,7 @@ def run(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder of the study: part-*.parquet.")
     ] = None,
-    workers: Workers = None,
+    workers: WorkersOption = None,
     dask: Dask = None,
     shard: Annotated[
         str | None, typer.Option(metavar="I/N", help="Only every N-th chunk, from the I-th; for arrays of jobs.")
@@ -98,7 +98,9 @@ def run(
         str | None,
         typer.Option(metavar="COLUMN", help="Estimate a statistic of this quantity with few exact runs ([accuracy])."),
     ] = None,
-    statistic: Annotated[str | None, typer.Option(metavar="mean|probability", help="Statistic to estimate.")] = None,
+    statistic: Annotated[
+        str | None, typer.Option(metavar="mean|probability", help="StatisticWord to estimate.")
+    ] = None,
     threshold: Annotated[
         str | None, typer.Option(metavar="VALUE", help="Value to be reached, for a probability.")
     ] = None,
@@ -125,7 +127,7 @@ def run(
     if output is None:
         raise InputError("--output is missing: give the folder of the study, such as -o out")
     part = (1, 1) if shard is None else module.parsed_shard(shard)
-    with Progress("records") as progress:
+    with ShownProgress("records") as progress:
         definition = load_study(source, progress)
     question = {
         "quantity": estimate, "statistic": statistic, "threshold": threshold, "target": target, "budget": budget,
@@ -141,7 +143,7 @@ def run(
     if estimated:
         _estimate(definition, output, question | engine, plot, as_json)
         return
-    with interruptible(output), Progress(f"{definition.runs} runs") as progress:
+    with interruptible(output), ShownProgress(f"{definition.runs} runs") as progress:
         done = module.study(definition, output, shard=part, progress=progress, **engine)
     judged = any(column.name == "limits_exceeded" for column in definition.keep.columns)
     _report(done, output, as_json, judged)
@@ -260,8 +262,8 @@ def fragility(
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study tornado out --quantity peak_displacement --plot tornado.png")
 def tornado(
     folder: Folder,
-    quantity: Quantity,
-    statistic: Statistic = "median",
+    quantity: QuantityColumn,
+    statistic: StatisticWord = "median",
     plot: Plot = None,
     output: Output = None,
     as_json: AsJson = False,

@@ -14,5 +14,8 @@ Progress = Callable[[float, float], None]
 BuildProgress = Callable[[str, float], None]
 """Called with the task of a build, and with the share that is done [-]."""
 
+Say = Callable[[str], None]
+"""Called with a line of text about what is done."""
+
 FitProgress = Callable[[int, float, float], None]
 """Called with the number of the evaluation, the share of it that is done [-], and the last deviation [N]."""

@@ -1,4 +1,4 @@
-"""The array type of the package, an ndarray of float64 of any shape, and arrays that lie one after the other in one."""
+"""The array types of the package, ndarrays of any shape; and arrays that lie one after the other in one."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
 
 def distinct(values: Array) -> Array:

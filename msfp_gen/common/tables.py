@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 TABLE_SUFFIXES = (".csv", ".parquet")
-Rows = list[tuple[str, str]]  # label and value
+LabelledValues = list[tuple[str, str]]  # label and value
 
 
 class Printed(ABC):
     """What `print` and a notebook show of an object that has a title and a few rows."""
 
     @abstractmethod
-    def printed_rows(self) -> tuple[str, Rows]:
+    def printed_rows(self) -> tuple[str, LabelledValues]:
         """Title, and label and value of each row."""
 
     def __repr__(self) -> str:
@@ -121,7 +121,7 @@ def decimal_text(value: float) -> str:
     return f"{value:.{min(max(3 - floor(log10(abs(value))), 0), 4)}f}"
 
 
-def vector(values: Iterable[float], scale: float = 1.0) -> str:
+def vector_text(values: Iterable[float], scale: float = 1.0) -> str:
     """Components of a vector, each times `scale`, with four significant digits and separated by commas."""
     return ", ".join(f"{value * scale:.4g}" for value in values)
 

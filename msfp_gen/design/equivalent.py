@@ -152,7 +152,9 @@ def total_displacement(
 
 
 Arms = Sequence[float]  # y, e, b, d [m] and P_T of `total_displacement`
-Peaks = tuple[float, float]  # of response histories: largest displacement of a bearing [m], base shear over weight [-]
+HistoryPeaks = tuple[
+    float, float
+]  # of response histories: largest displacement of a bearing [m], base shear over weight [-]
 
 
 @dataclass(frozen=True)
@@ -180,7 +182,7 @@ class Given:
     bearings: str = ""
     weight: float | None = None
     arms: Arms | None = None
-    peaks: Mapping[str, Peaks] = field(default_factory=dict)
+    peaks: Mapping[str, HistoryPeaks] = field(default_factory=dict)
     history: str = ""
 
 

@@ -100,7 +100,7 @@ def _tree(models: dict[str, ModelSpec], built: BuiltLibrary, platform: Platform,
         texts |= {f"{SHARE}/src/{model}/{name}": text for name, text in sources.items()}
     tree: Tree = {path: text.encode() for path, text in texts.items()}
     tree |= {f"lib/{STATIC}": built.static.read_bytes(), platform.shared: built.shared.read_bytes()}
-    imports = built.imports.read_bytes() if built.imports is not None else Link(built.shared.name)
+    imports = built.imports.read_bytes() if built.imports is not None else SymbolicLink(built.shared.name)
     return tree | {platform.linker_name: imports}
 
 
@@ -187,13 +187,13 @@ MANIFEST = "share/msfp/manifest.json"
 
 
 @dataclass(frozen=True)
-class Link:
+class SymbolicLink:
     """A symbolic link to a file in the same folder."""
 
     to: str
 
 
-Tree = dict[str, bytes | Link]  # path below the prefix -> content
+Tree = dict[str, bytes | SymbolicLink]  # path below the prefix -> content
 
 
 def check_prefix(prefix: Path) -> None:
@@ -257,8 +257,8 @@ def _write_manifest(prefix: Path, files: dict[str, list[str]]) -> None:
     write_bytes(path, [json.dumps({"files": files}, indent=1).encode() + b"\n"])
 
 
-def _digest_of(content: bytes | Link) -> str:
-    return f"link to {content.to}" if isinstance(content, Link) else hashlib.sha256(content).hexdigest()
+def _digest_of(content: bytes | SymbolicLink) -> str:
+    return f"link to {content.to}" if isinstance(content, SymbolicLink) else hashlib.sha256(content).hexdigest()
 
 
 def _digest_at(path: Path) -> str | None:
@@ -270,7 +270,7 @@ def _digest_at(path: Path) -> str | None:
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "no file"
 
 
-def _put(path: Path, content: bytes | Link) -> None:
+def _put(path: Path, content: bytes | SymbolicLink) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     if isinstance(content, bytes):
         write_bytes(path, [content])

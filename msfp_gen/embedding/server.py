@@ -13,11 +13,11 @@ from typing import Self
 
 import numpy as np
 
+from msfp_gen.common.aliases import Say
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, MsfpError, RunError
 from msfp_gen.embedding.two_port import TwoPort
 
-Report = Callable[[str], None]
 SIZES = np.dtype("<i4")  # the first message of a client: eleven of these
 SIZE_COUNT = 11
 NUMBERS = np.dtype("<f8")  # of all other messages
@@ -79,7 +79,7 @@ class ServedBearing:
     the client's iteration cannot converge.
     """
 
-    def __init__(self, port: TwoPort, count: int, report: Report, up: str = "Z") -> None:
+    def __init__(self, port: TwoPort, count: int, report: Say, up: str = "Z") -> None:
         self.port = port
         self.failed = ""  # message of the present failure
         self.failures = 0
@@ -195,7 +195,7 @@ class Server:
         bearings: Sequence[tuple[str, Callable[[], TwoPort]]],
         port: int,
         *,
-        report: Report,
+        report: Say,
         host: str = "127.0.0.1",
         up: str = "Z",
     ) -> None:

@@ -21,9 +21,9 @@ from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.common.version import __version__
 from msfp_gen.embedding.description import (
-    Block,
-    Unit,
-    Variable,
+    ReferenceBlock,
+    UnitDescription,
+    UnitVariable,
     build_description,
     model_description,
     top_names,
@@ -59,7 +59,7 @@ class WrittenUnit:
     path: Path
     model: str
     kinds: tuple[str, ...]
-    variables: tuple[Variable, ...]
+    variables: tuple[UnitVariable, ...]
 
 
 def write_fmu(
@@ -137,14 +137,14 @@ def _check_exchange(scene: Scene) -> None:
         )
 
 
-def _unit(scene: Scene, name: str, version: int, exchange: bool) -> Unit:
+def _unit(scene: Scene, name: str, version: int, exchange: bool) -> UnitDescription:
     unit_variables = variables(scene, exchange)
     what = f"{spec_of_unit(scene).key} {scene.solver!r} {version} {exchange} {__version__} {unit_variables!r}"
     digest = hashlib.sha256(what.encode())
     for text in _written(version).values():
         digest.update(text.encode())
     inout = "force in, motion of a supported mass out" if isinstance(scene.top, MassTop) else "motion in, wrench out"
-    return Unit(
+    return UnitDescription(
         name=name,
         identifier=re.sub(r"^(?=\d)|\W", "_", name, flags=re.ASCII),
         token=f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}",
@@ -167,7 +167,12 @@ def _written(version: int) -> dict[str, str]:
 
 
 def _files(
-    scene: Scene, unit: Unit, version: int, exchange: bool, folder: Path, progress: Callable[[str, float], None]
+    scene: Scene,
+    unit: UnitDescription,
+    version: int,
+    exchange: bool,
+    folder: Path,
+    progress: Callable[[str, float], None],
 ) -> dict[str, bytes]:
     """Content of the archive."""
     content = model_content(scene, unit, exchange)
@@ -204,7 +209,7 @@ def _archive(content: dict[str, bytes]) -> bytes:
     return stream.getvalue()
 
 
-def model_content(scene: Scene, unit: Unit, exchange: bool) -> dict[str, Any]:
+def model_content(scene: Scene, unit: UnitDescription, exchange: bool) -> dict[str, Any]:
     """The names in the templates fmu_model.h and fmu_model.c."""
     effects, count = scene.modelled, scene.bearing.layout.surfaces
     loaded, surface = isinstance(scene.top, MassTop), contract.surface_values(effects)
@@ -226,28 +231,28 @@ def model_content(scene: Scene, unit: Unit, exchange: bool) -> dict[str, Any]:
         "seat_stiffness": surface.index("seat_stiffness") if effects.uplift else 0,
         "top_size": len(top),
         "output_places": _output_places(unit, loaded),
-        "output_count": len(unit.at(Block.OUTPUTS)),
+        "output_count": len(unit.at(ReferenceBlock.OUTPUTS)),
         "places": _places(unit, loaded),
         "names": [variable.name for variable in unit.variables],
         "start": [variable.start for variable in unit.variables],
-        "input_nominals": [unit.variables[i].nominal for i in unit.at(Block.INPUTS)],
-        "state_nominals": [*(unit.variables[i].nominal for i in unit.at(Block.STATES)), 1.0],
+        "input_nominals": [unit.variables[i].nominal for i in unit.at(ReferenceBlock.INPUTS)],
+        "state_nominals": [*(unit.variables[i].nominal for i in unit.at(ReferenceBlock.STATES)), 1.0],
     }
 
 
-def _output_places(unit: Unit, loaded: bool) -> list[tuple[str, int]]:
+def _output_places(unit: UnitDescription, loaded: bool) -> list[tuple[str, int]]:
     """Names in C of outputs, counted from the first output."""
-    names = [unit.variables[i].name for i in unit.at(Block.OUTPUTS)]
+    names = [unit.variables[i].name for i in unit.at(ReferenceBlock.OUTPUTS)]
     names_in_c = {"SLIDING": "surface[1].sliding", "NORMAL": "surface[1].normal"}
     if loaded:
         names_in_c |= {"TOP_FORCE": "top.force[1]", "BASE_FORCE": "lower.force[1]"}
     return [(place, names.index(name)) for place, name in names_in_c.items()]
 
 
-def _places(unit: Unit, loaded: bool) -> list[tuple[str, int]]:
+def _places(unit: UnitDescription, loaded: bool) -> list[tuple[str, int]]:
     """Names of value references in C: where blocks begin, and the variables that have a place."""
     places, end = [], 0
-    for block in Block:
+    for block in ReferenceBlock:
         references = unit.at(block)
         places.append((block.value, end))
         end += len(references)

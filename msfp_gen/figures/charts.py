@@ -22,7 +22,7 @@ from msfp_gen.figures.style import (
     SMALL,
     THIN,
     Scale,
-    distinct,
+    distinct_colours,
     engineering,
     headline,
     page,
@@ -105,7 +105,7 @@ def plot_response_spectrum(
     with page(7.6, 4.8, path) as figure:
         headline(figure, title)
         axes = figure.subplots()
-        for colour, (label, values) in zip(distinct(len(curves)), curves.items(), strict=True):
+        for colour, (label, values) in zip(distinct_colours(len(curves)), curves.items(), strict=True):
             axes.plot(x, values, color=colour, label=label)
         if mean is not None:
             axes.plot(x, np.asarray(mean, dtype=float), color=INK, linewidth=2.5, label="mean")

@@ -37,7 +37,7 @@ from msfp_gen.figures.style import (
     subscript,
 )
 from msfp_gen.motions.checks import positive
-from msfp_gen.results.geometry import Section, sections
+from msfp_gen.results.geometry import StackSection, sections
 from msfp_gen.results.joining import checked_times
 from msfp_gen.results.result import Result
 
@@ -130,7 +130,7 @@ def stack_film(result: Result, times: Array, azimuth: float | None) -> Film:
     return Film(tall, len(times), lambda figure: _layout(figure, result, frames, drawn_sections))
 
 
-def _layout(figure: Figure, result: Result, frames: Result, drawn_sections: list[Section]) -> Layout:
+def _layout(figure: Figure, result: Result, frames: Result, drawn_sections: list[StackSection]) -> MovieLayout:
     """Draw all parts; returns a function that moves them to one row of `frames`, and the artists that it changes."""
     headline(figure, label_of(result))
     height = figure.get_size_inches()[1]
@@ -183,7 +183,7 @@ DOTS = 80  # per inch: 800 pixels wide
 WIDE = 10.0  # width of the movie [inch]
 PALETTE = 256  # colours of a GIF
 
-Layout = tuple[Callable[[int], None], list[Any]]
+MovieLayout = tuple[Callable[[int], None], list[Any]]
 
 
 class Film(NamedTuple):
@@ -195,7 +195,7 @@ class Film(NamedTuple):
 
     height: float
     frames: int
-    layout: Callable[[Figure], Layout]
+    layout: Callable[[Figure], MovieLayout]
 
 
 def even(height: float) -> float:

@@ -24,7 +24,7 @@ from msfp_gen.figures.style import (
     page,
     subscript,
 )
-from msfp_gen.results.geometry import Section, sections
+from msfp_gen.results.geometry import StackSection, sections
 from msfp_gen.results.geometry import friction_circles as circle_radii
 from msfp_gen.results.result import Result
 from msfp_gen.results.sign import shown_sign
@@ -97,7 +97,7 @@ class SectionDrawing:
         title: title of the axes, with time and displacement.
     """
 
-    def __init__(self, axes: Axes, then: Result, section: Section, row: int = 0) -> None:
+    def __init__(self, axes: Axes, then: Result, section: StackSection, row: int = 0) -> None:
         history, last = then.alone.history, len(section.bodies) - 1
         self.history = history
         self.slides, self.on_rim = sliding_surfaces(history), rims_in_contact(history)
@@ -135,7 +135,7 @@ class SectionDrawing:
         """The entries of a legend: surfaces from the top, then the line of force."""
         return [*self.faces[::-1], self.line]
 
-    def update(self, section: Section, row: int) -> None:
+    def update(self, section: StackSection, row: int) -> None:
         """Move everything to one row; `section` is the section at this row."""
         history, apart = self.history, self.apart[row]
         for artist, polygon in zip(self.bodies, section.bodies, strict=True):
@@ -154,7 +154,7 @@ class SectionDrawing:
         self.title.set_text(f"t = {history.time[row]:.3f} s, {u}")
 
 
-def _force_line(section: Section) -> tuple[Array, Array]:
+def _force_line(section: StackSection) -> tuple[Array, Array]:
     """Line of force of every surface up to halfway to its neighbours, and beyond base and top [mm]."""
     heights = np.concatenate([polygon[:, 1] for polygon in section.bodies])
     low, high = float(heights.min()), float(heights.max())
@@ -169,7 +169,7 @@ def _force_line(section: Section) -> tuple[Array, Array]:
     return points[:, 0], points[:, 1]
 
 
-def draw_circles(axes: Axes, section: Section, radii: Array) -> None:
+def draw_circles(axes: Axes, section: StackSection, radii: Array) -> None:
     """Draw sphere centres and friction circles, and the lines of force extended up to them."""
     from matplotlib.patches import Circle
 
@@ -193,7 +193,7 @@ def draw_circles(axes: Axes, section: Section, radii: Array) -> None:
         )
 
 
-def limits(drawn_sections: list[Section]) -> tuple[tuple[float, float], tuple[float, float]]:
+def limits(drawn_sections: list[StackSection]) -> tuple[tuple[float, float], tuple[float, float]]:
     """Horizontal and vertical limits [mm] that contain the stack and its line of force in all sections."""
     points = np.concatenate([polygon for section in drawn_sections for polygon in section.bodies]) * MILLI
     (left, low), (right, high) = points.min(axis=0), points.max(axis=0)

@@ -91,7 +91,7 @@ def page(width: float, height: float, path: str | Path | None = None, name: str 
                 figure.savefig(temporary, metadata={"Date": None} if target.suffix.lower() == ".svg" else None)
 
 
-def distinct(count: int) -> list[str]:
+def distinct_colours(count: int) -> list[str]:
     """So many different colours: from the palette, or where it has too few, from a rainbow of even lightness."""
     if count <= len(COLOURS):
         return list(COLOURS[:count])

@@ -41,7 +41,15 @@ from msfp_gen.common.aliases import BuildProgress
 from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.tables import Table
 from msfp_gen.jit import cache
-from msfp_gen.jit.compiler import CFLAGS, COMPILER, EXTENSION_SUFFIX, LOG_NAME, compile_extension, words, x86_64_level
+from msfp_gen.jit.compiler import (
+    CFLAGS,
+    COMPILER,
+    EXTENSION_SUFFIX,
+    LOG_NAME,
+    compile_extension,
+    words_of_variable,
+    x86_64_level,
+)
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 ENTRY = "msfp_entry.c"
@@ -482,7 +490,7 @@ def _content(manifest: cache.Manifest) -> str:
 
 def _find(module: str, content: str) -> tuple[Path, cache.Manifest] | None:
     root = prebuilt_folder()
-    if not root.is_dir() or words(COMPILER) or words(CFLAGS):
+    if not root.is_dir() or words_of_variable(COMPILER) or words_of_variable(CFLAGS):
         return None
     reached = x86_64_level() or 1
     for level in (level for level in PREBUILT_LEVELS if level <= reached):

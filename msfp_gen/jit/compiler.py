@@ -34,7 +34,7 @@ COMPILER, CFLAGS = "CC", "MSFP_GEN_CFLAGS"
 FORBIDDEN = ("-Ofast", "-ffast-math", "-ffinite-math-only")
 
 
-def words(name: str) -> tuple[str, ...]:
+def words_of_variable(name: str) -> tuple[str, ...]:
     """The words of an environment variable. Raises InputError where a quote is not closed, or a flag is forbidden."""
     text = os.environ.get(name, "")
     try:
@@ -52,7 +52,7 @@ def words(name: str) -> tuple[str, ...]:
 def user_flags() -> tuple[str, ...]:
     """The words of MSFP_GEN_CFLAGS; none where these are refused, which `find_compiler` then reports."""
     try:
-        return words(CFLAGS)
+        return words_of_variable(CFLAGS)
     except InputError:
         return ()
 
@@ -108,7 +108,7 @@ class Compiler:
     version: str
 
 
-class Step(NamedTuple):
+class BuildStep(NamedTuple):
     """One command of a build; `subject` is the file that it processes."""
 
     subject: str
@@ -128,8 +128,8 @@ def find_compiler() -> Compiler:
         CC or MSFP_GEN_CFLAGS has an open quote or a flag that is not permitted.
 
     """
-    words(CFLAGS)
-    chosen = shlex.join(words(COMPILER))
+    words_of_variable(CFLAGS)
+    chosen = shlex.join(words_of_variable(COMPILER))
     candidates = [chosen] if chosen else [sysconfig.get_config_var("CC") or "", *PLATFORM_COMPILERS]
     commands = [shlex.split(candidate) for candidate in filter(None, candidates)]
     if not chosen and (zig := zig_program()) is not None:
@@ -222,7 +222,7 @@ def compile_extension(
     else:
         chains.insert(0, _wrapper_steps(wrapper, compiler, include))
 
-    def run(step: Step) -> None:
+    def run(step: BuildStep) -> None:
         if step.subject not in units:
             log.run(step)
         else:
@@ -232,16 +232,22 @@ def compile_extension(
         if progress is not None:
             progress(done, len(chains))
     objects = [object_file(name) for name in [*units, wrapper]]
-    target = folder / f"{module}{EXTENSION_SUFFIX}"
-    log.run(Step(target.name, (*_link_command(compiler), *objects, "-o", target.name, *FLAGS["libraries"], *libraries)))
-    if not target.is_file():
-        message = f"{shlex.join(compiler.command)} wrote no {target.name}: this is no C compiler; name one with CC=..."
-        raise CompileError(message, log=log.path)
+    target = _linked(folder / f"{module}{EXTENSION_SUFFIX}", objects, compiler, libraries, log)
     if kept is not None and known is None:
         _keep(kept, (folder / object_file(wrapper)).read_bytes())
     for name in objects:
         (folder / name).unlink()
     (folder / f"{wrapper}.c").unlink(missing_ok=True)
+    return target
+
+
+def _linked(target: Path, objects: Sequence[str], compiler: Compiler, libraries: Sequence[str], log: Log) -> Path:
+    """The extension of these objects. Raises CompileError."""
+    options = (*FLAGS["libraries"], *libraries)
+    log.run(BuildStep(target.name, (*_link_command(compiler), *objects, "-o", target.name, *options)))
+    if not target.is_file():
+        message = f"{shlex.join(compiler.command)} wrote no {target.name}: this is no C compiler; name one with CC=..."
+        raise CompileError(message, log=log.path)
     return target
 
 
@@ -271,7 +277,7 @@ class Log:
         self.path = folder / LOG_NAME
         write_text(self.path, "")
 
-    def run(self, step: Step) -> None:
+    def run(self, step: BuildStep) -> None:
         """Run one step. Raises CompileError if its exit status is not 0."""
         # `ERROR_PATTERNS` expect English messages.
         environment = {**os.environ, "LC_ALL": "C"}
@@ -302,10 +308,10 @@ def first_error(output: str, code: int) -> str:
     return next((line.strip() for line in reversed(lines) if line.strip()), f"exit code {code} and no output")
 
 
-def run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> Iterator[int]:
+def run_parallel(chains: Sequence[Sequence[BuildStep]], run: Callable[[BuildStep], None]) -> Iterator[int]:
     """Run all chains, one a processor at a time, and yield how many are finished; after a failure none is started."""
 
-    def run_chain(chain: Sequence[Step]) -> None:
+    def run_chain(chain: Sequence[BuildStep]) -> None:
         for step in chain:
             run(step)
 
@@ -321,9 +327,9 @@ def run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) 
             raise
 
 
-def compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> Step:
+def compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> BuildStep:
     """Compilation of one C file; the object lies beside it."""
-    return Step(name, (*compiler.command, *flags, "-c", name, "-o", object_file(name)))
+    return BuildStep(name, (*compiler.command, *flags, "-c", name, "-o", object_file(name)))
 
 
 def compile_once(name: str, compiler: Compiler, flags: Sequence[str], log: Log, shared: Path | None) -> None:
@@ -335,7 +341,7 @@ def compile_once(name: str, compiler: Compiler, flags: Sequence[str], log: Log, 
         log.run(compile_step(name, compiler, flags))
         return
     text, target = log.folder / f"{name}.i", log.folder / object_file(name)
-    log.run(Step(name, (*compiler.command, *flags, "-E", "-P", name, "-o", f"{name}.i")))
+    log.run(BuildStep(name, (*compiler.command, *flags, "-E", "-P", name, "-o", f"{name}.i")))
     if not text.is_file():  # no C compiler, which is named where it has linked nothing
         log.run(compile_step(name, compiler, flags))
         return
@@ -350,12 +356,12 @@ def compile_once(name: str, compiler: Compiler, flags: Sequence[str], log: Log, 
     _keep(path, target.read_bytes())
 
 
-def _wrapper_steps(wrapper: str, compiler: Compiler, include: Path) -> list[Step]:
+def _wrapper_steps(wrapper: str, compiler: Compiler, include: Path) -> list[BuildStep]:
     """Translation of the wrapper by Cython in a separate Python (`-P`: without the folder on its path), compilation."""
     pyx, c = f"{wrapper}.pyx", f"{wrapper}.c"
-    cython = Step(pyx, (sys.executable, "-P", "-m", "cython", "-3", pyx, "-o", c))
+    cython = BuildStep(pyx, (sys.executable, "-P", "-m", "cython", "-3", pyx, "-o", c))
     command = (*compiler.command, *FLAGS["wrapper"], "-I", str(include), "-c", c, "-o", object_file(c))
-    return [cython, Step(c, command)]
+    return [cython, BuildStep(c, command)]
 
 
 def _link_command(compiler: Compiler) -> tuple[str, ...]:

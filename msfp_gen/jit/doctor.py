@@ -28,7 +28,7 @@ TEST_SOURCES = {
 
 
 @dataclass(frozen=True)
-class Check:
+class CheckResult:
     """Result of one check.
 
     Attributes:
@@ -44,7 +44,7 @@ class Check:
     remedy: str = ""
 
 
-def diagnose() -> list[Check]:
+def diagnose() -> list[CheckResult]:
     """Check Python, each dependency, models of the wheel, compiler, headers, a small build, cache folder and disk."""
     return [
         check_python(),
@@ -58,10 +58,10 @@ def diagnose() -> list[Check]:
     ]
 
 
-def check_python() -> Check:
+def check_python() -> CheckResult:
     """Version of the running Python against `Requires-Python` of the distribution."""
     required = _requires_python()
-    return Check(
+    return CheckResult(
         "python",
         sys.version_info[: len(required)] >= required,
         f"{platform.python_version()} at {sys.executable}",
@@ -69,43 +69,43 @@ def check_python() -> Check:
     )
 
 
-def check_dependencies() -> list[Check]:
+def check_dependencies() -> list[CheckResult]:
     """Installed version of each declared dependency against its lower bound."""
     try:
         declared = metadata.requires(DISTRIBUTION) or []
     except metadata.PackageNotFoundError:
-        return [Check(DISTRIBUTION, False, "not installed", "pip install . in the checkout")]
+        return [CheckResult(DISTRIBUTION, False, "not installed", "pip install . in the checkout")]
     return [_check_requirement(line) for line in declared if "extra ==" not in line]
 
 
-def check_prebuilt() -> Check:
+def check_prebuilt() -> CheckResult:
     """The models that came compiled; a sound installation may have none."""
     try:
         count = sum(find_prebuilt(spec) is not None for spec in prebuilt_specs())
     except InputError as error:
-        return Check("prebuilt models", False, *_found_and_remedy(error))
+        return CheckResult("prebuilt models", False, *_found_and_remedy(error))
     detail = f"{count} that need no compiler" if count else "none: a model is compiled at its first use"
-    return Check("prebuilt models", True, detail)
+    return CheckResult("prebuilt models", True, detail)
 
 
-def check_compiler() -> Check:
+def check_compiler() -> CheckResult:
     """The C compiler that builds would use."""
     try:
         compiler = find_compiler()
     except (CompileError, InputError) as error:
-        return Check("C compiler", False, *_found_and_remedy(error))
-    return Check("C compiler", True, f"{' '.join(compiler.command)} at {compiler.path}: {compiler.version}")
+        return CheckResult("C compiler", False, *_found_and_remedy(error))
+    return CheckResult("C compiler", True, f"{' '.join(compiler.command)} at {compiler.path}: {compiler.version}")
 
 
-def check_python_headers() -> Check:
+def check_python_headers() -> CheckResult:
     """The header `Python.h`, which the compilation of models needs."""
     try:
-        return Check("Python headers", True, str(check_headers()))
+        return CheckResult("Python headers", True, str(check_headers()))
     except CompileError as error:
-        return Check("Python headers", False, *_found_and_remedy(error))
+        return CheckResult("Python headers", False, *_found_and_remedy(error))
 
 
-def check_build() -> Check:
+def check_build() -> CheckResult:
     """Cython, compiler and linker: builds and imports a module of one function."""
     begin = perf_counter()
     try:
@@ -113,34 +113,34 @@ def check_build() -> Check:
             path = compile_extension(TEST_SOURCES, "msfp_doctor", Path(folder))
             correct = load_extension(path, "msfp_doctor").answer() == 42
     except (CompileError, InputError, OSError) as error:
-        return Check("build a module", False, str(error), "resolve the failed checks above first")
-    return Check(
+        return CheckResult("build a module", False, str(error), "resolve the failed checks above first")
+    return CheckResult(
         "build a module", correct, f"{perf_counter() - begin:.1f} s", "the module was built but returns a wrong value"
     )
 
 
-def check_cache() -> Check:
+def check_cache() -> CheckResult:
     """Whether the cache folder of compiled models is writable."""
     root = cache_root()
     try:
         root.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=root):
-            return Check("model cache", True, str(root))
+            return CheckResult("model cache", True, str(root))
     except OSError as error:
         remedy = "set MSFP_GEN_CACHE to a folder that you can write"
-        return Check("model cache", False, f"cannot write {root} ({error.strerror or error})", remedy)
+        return CheckResult("model cache", False, f"cannot write {root} ({error.strerror or error})", remedy)
 
 
-def check_disk() -> Check:
+def check_disk() -> CheckResult:
     """Free disk space of the cache folder."""
     root = cache_root()
     existing = next(folder for folder in (root, *root.parents) if folder.exists())
     free = shutil.disk_usage(existing).free
     detail = f"{free / 1e9:.1f} GB free at {existing}"
-    return Check("free disk", free > FREE_DISK, detail, f"free {FREE_DISK / 1e6:.0f} MB, or set MSFP_GEN_CACHE")
+    return CheckResult("free disk", free > FREE_DISK, detail, f"free {FREE_DISK / 1e6:.0f} MB, or set MSFP_GEN_CACHE")
 
 
-def _check_requirement(line: str) -> Check:
+def _check_requirement(line: str) -> CheckResult:
     """Check of one line of the declared dependencies, such as `numpy>=1.26`."""
     match = re.match(r"([\w.-]+)\s*(?:>=\s*([\d.]+))?", line)
     if match is None:
@@ -150,8 +150,8 @@ def _check_requirement(line: str) -> Check:
     try:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
-        return Check(name, False, "not installed", remedy)
-    return Check(name, _numbers(version) >= _numbers(least), version, remedy)
+        return CheckResult(name, False, "not installed", remedy)
+    return CheckResult(name, _numbers(version) >= _numbers(least), version, remedy)
 
 
 def _requires_python() -> tuple[int, ...]:
@@ -176,7 +176,7 @@ def _dotted(numbers: tuple[int, ...]) -> str:
     return ".".join(map(str, numbers))
 
 
-def check_table(checks: Iterable[Check]) -> Table:
+def check_table(checks: Iterable[CheckResult]) -> Table:
     """Result of `msfp-gen doctor`, one row per check."""
     rows = [
         (check.name, *(("ok", check.detail) if check.ok else ("MISSING", f"{check.detail}; {check.remedy}")))

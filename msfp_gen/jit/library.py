@@ -20,15 +20,15 @@ from msfp_gen.jit.cache import objects_folder
 from msfp_gen.jit.compiler import (
     FLAGS,
     ZIG_OPTIONS,
+    BuildStep,
     Compiler,
     Log,
-    Step,
     compile_once,
     compile_step,
     find_compiler,
     object_file,
     run_parallel,
-    words,
+    words_of_variable,
     zig_program,
 )
 from msfp_gen.specification.layout import ModelSpec
@@ -66,7 +66,7 @@ def build_library(
     units = [f"{model}/{name}" for model, files in sources.items() for name in files if name.endswith(".c")]
     log = Log(folder)
     objects = _compile(units, ", ".join(sources), compiler, log, progress)
-    log.run(Step(STATIC, (*archiver, "rcs", STATIC, *objects)))
+    log.run(BuildStep(STATIC, (*archiver, "rcs", STATIC, *objects)))
     # Versions of a function for several processors stay visible in spite of -fvisibility=hidden.
     write_text(folder / EXPORTS, f"{{ global: {'; '.join(sources)}; local: *; }};\n")
     shared = Path(platform.shared).name
@@ -113,7 +113,7 @@ def _compile(
     """Compile C files in the folder of a log, those that another library has not; returns the object files."""
     flags = (*FLAGS["c"], *FLAGS["user"])
 
-    def run(step: Step) -> None:
+    def run(step: BuildStep) -> None:
         compile_once(step.subject, compiler, flags, log, objects_folder())
 
     for done in run_parallel([[compile_step(name, compiler, flags)] for name in units], run):
@@ -140,8 +140,8 @@ def _write_sources(
     return sources
 
 
-def _link_step(compiler: Compiler, options: Sequence[str], objects: Sequence[str], target: str) -> Step:
-    return Step(target, (*compiler.command, *options, *objects, "-o", target, *FLAGS["libraries"]))
+def _link_step(compiler: Compiler, options: Sequence[str], objects: Sequence[str], target: str) -> BuildStep:
+    return BuildStep(target, (*compiler.command, *options, *objects, "-o", target, *FLAGS["libraries"]))
 
 
 EXPORTS = "msfp.map"  # what a shared library for Linux shows: one function of each model
@@ -218,7 +218,7 @@ def find_tools(platform: Platform) -> tuple[Compiler, tuple[str, ...]]:
 
 def _find_archiver() -> tuple[str, ...]:
     """The archiver that `AR` names, else `ar`, else the one of ziglang. Raises CompileError where there is none."""
-    named = words("AR")
+    named = words_of_variable("AR")
     command = named or ("ar",)
     if shutil.which(command[0]) is not None:
         return command

@@ -90,7 +90,7 @@ class Stack(Protocol):
         """Named points, rotations and bases (3.1)-(3.12), in shapes as in `named_vectors`."""
 
 
-class AnyRun(Protocol):
+class CompiledRun(Protocol):
     """A run of a bearing or of a building, in progress or ended."""
 
     @property
@@ -113,7 +113,7 @@ class AnyRun(Protocol):
         """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
 
 
-class Run(AnyRun, Protocol):
+class CompiledBearingRun(CompiledRun, Protocol):
     """A run of the compiled integrator of a bearing."""
 
     @property
@@ -225,15 +225,15 @@ class Port(Protocol):
         """Accept the step; status."""
 
 
-Column = tuple[int, int, int]
+ColumnIndex = tuple[int, int, int]
 
 
-def columns(wrt: str, count: int, effects: Effects) -> list[Column]:
+def jacobian_columns(wrt: str, count: int, effects: Effects) -> list[ColumnIndex]:
     """The columns of `Model.jacobian` for wrt = "unknowns", "state" or "inputs" of a stack with `count` surfaces.
 
     Raises InputError for another `wrt`.
     """
-    makers: dict[str, Callable[[], list[Column]]] = {
+    makers: dict[str, Callable[[], list[ColumnIndex]]] = {
         "unknowns": lambda: unknown_columns(count, effects),
         "state": lambda: state_columns(count, effects),
         "inputs": input_columns,
@@ -254,7 +254,7 @@ def free_coordinates(effects: Effects) -> list[int]:
     return [i for i in every if i < 3 or effects.uplift]
 
 
-def unknown_columns(count: int, effects: Effects) -> list[Column]:
+def unknown_columns(count: int, effects: Effects) -> list[ColumnIndex]:
     """The unknowns in the order of (2.119): accelerations, contact positions, normal forces."""
     bodies, contact = range(count), (1,) if effects.dimension == "planar" else (0, 1)
     fields = coordinate_fields(2, effects)
@@ -265,7 +265,7 @@ def unknown_columns(count: int, effects: Effects) -> list[Column]:
     ]
 
 
-def state_columns(count: int, effects: Effects) -> list[Column]:
+def state_columns(count: int, effects: Effects) -> list[ColumnIndex]:
     """The state q, v and h, each flattened."""
     bodies = range(count)
     return [
@@ -274,7 +274,7 @@ def state_columns(count: int, effects: Effects) -> list[Column]:
     ]
 
 
-def input_columns() -> list[Column]:
+def input_columns() -> list[ColumnIndex]:
     """Base translations and rotations with first and second derivatives, then the load on the top plate."""
     return [*((3, 0, i) for i in range(9)), *((0, 0, i) for i in range(9)), *((4, 0, i) for i in range(6))]
 

@@ -19,8 +19,8 @@ from msfp_gen.model.compiled import (
     Evaluation,
     Stack,
     bodies_and_surfaces,
-    columns,
     free_coordinates,
+    jacobian_columns,
     many,
     named_vectors,
     separations_at_rest,
@@ -61,7 +61,7 @@ class Ode:
             )
         if is_sprung(top):
             raise InputError(
-                f"as_ode: top.vertical_stiffness = {top.vertical_stiffness!r}: y does not contain the height of the "  # type: ignore[attr-defined]
+                f"as_ode: top.vertical_stiffness = {top.vertical_stiffness!r}: y does not contain the height of the "
                 "foot; use simulate, or leave the vertical spring out"
             )
         if model.planar and motion.plane() != 0.0:
@@ -145,7 +145,7 @@ class Ode:
 
 
 Triple = tuple[float, float, float]
-Rotation = tuple[ArrayLike, ArrayLike, ArrayLike]
+RotationState = tuple[ArrayLike, ArrayLike, ArrayLike]
 ZERO: Triple = (0.0, 0.0, 0.0)
 
 
@@ -209,7 +209,7 @@ class Model:
         base_acceleration: ArrayLike = ZERO,
         top_force: ArrayLike = ZERO,
         top_moment: ArrayLike = ZERO,
-        base_rotation: Rotation | None = None,
+        base_rotation: RotationState | None = None,
         temperature: ArrayLike | None = None,
         formulation: str = "condensed",
     ) -> Evaluation:
@@ -349,7 +349,7 @@ class Model:
         base_acceleration: ArrayLike = ZERO,
         top_force: ArrayLike = ZERO,
         top_moment: ArrayLike = ZERO,
-        base_rotation: Rotation | None = None,
+        base_rotation: RotationState | None = None,
     ) -> Array:
         """Residual of the momentum balances (3.26)-(3.29) at given unknowns: left side less right side.
 
@@ -379,7 +379,7 @@ class Model:
         base_acceleration: ArrayLike = ZERO,
         top_force: ArrayLike = ZERO,
         top_moment: ArrayLike = ZERO,
-        base_rotation: Rotation | None = None,
+        base_rotation: RotationState | None = None,
     ) -> Array:
         """Jacobian of `residual`, ndarray, shape (unknowns, k).
 
@@ -387,7 +387,7 @@ class Model:
         model in its plane); "inputs" (k = 24: base displacement, velocity, acceleration; psi_1, theta_1, phi_1, rates,
         accelerations; top force; top moment). Other inputs and errors as in `residual`.
         """
-        variables = columns(wrt, self.layout.surfaces, self.effects)
+        variables = jacobian_columns(wrt, self.layout.surfaces, self.effects)
         state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
         values = vector(unknowns, "unknowns", (self.extension.UNKNOWNS,), "rad/s^2, rad, N")
         stack = self.stack(bearing)
@@ -434,7 +434,7 @@ class Model:
         v: ArrayLike,
         h: ArrayLike,
         acceleration: ArrayLike,
-        rotation: Rotation | None,
+        rotation: RotationState | None,
         force: ArrayLike,
         moment: ArrayLike,
     ) -> State:

@@ -14,7 +14,7 @@ from msfp_gen.common.errors import InputError
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
 
-Kind = Literal["angles", "pair_angles", "pair", "vector", "axial"]
+PlanarKind = Literal["angles", "pair_angles", "pair", "vector", "axial"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,7 @@ def rotated_pairs(pairs: Array, angle: float) -> Array:
     return np.ascontiguousarray(rotated(padded, angle)[..., :2])
 
 
-def out_of_plane(values: Array, azimuth: float, kind: Kind) -> Array:
+def out_of_plane(values: Array, azimuth: float, kind: PlanarKind) -> Array:
     """Results of a planar model in the frame of the user; angles are exact at azimuth 0 and pi/2, else to order tilt^2.
 
     values: shape (..., 2) or (..., 3), as those returned [unit of `values`]; `kind` says whether they are Euler

@@ -14,13 +14,9 @@ from math import factorial
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from msfp_gen.common.arrays import Array, distinct
+from msfp_gen.common.arrays import Array, Flags, Indices, distinct
 from msfp_gen.motions.piecewise import ORDER, polynomial, powers
-
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 
 # A knot is smooth if the polynomial before it, continued over the shorter of the two neighbouring pieces, deviates from
 # the history by at most this share of the largest value; by order of derivative. Quintic pieces through a sampled sine

@@ -24,10 +24,21 @@ from msfp_gen.common.fields import G, Quantity, ruled_fields
 from msfp_gen.common.tables import Table, decimal_text
 from msfp_gen.common.version import __version__
 from msfp_gen.figures.sheet import plot_sheet
-from msfp_gen.figures.style import CASE_COLOURS, COLOURS, FAINT, INK, THIN, distinct, headline, page, panels, plain
+from msfp_gen.figures.style import (
+    CASE_COLOURS,
+    COLOURS,
+    FAINT,
+    INK,
+    THIN,
+    distinct_colours,
+    headline,
+    page,
+    panels,
+    plain,
+)
 from msfp_gen.report.compared import compared_table
 from msfp_gen.report.frames import picture, render, write_page
-from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, kind_of, terms_shown
+from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, bearing_kind, terms_shown
 from msfp_gen.report.repeated import (
     Repeated,
     error_words,
@@ -139,7 +150,7 @@ def analysis_html(
     found += _last_sections(study, bounds, rows, scene, runs)
     sections = [part for part in found if part.tables or part.figures or part.words]
     exceeded, failed = bool(bounds.exceeded), bool(bounds.failures or bounds.stopped)
-    device = ", ".join(dict.fromkeys(map(kind_of, scene.every_bearing)))
+    device = ", ".join(dict.fromkeys(map(bearing_kind, scene.every_bearing)))
     return render(
         "analysis.html.jinja",
         name=f"{bounds.name or 'unnamed scene'}: response history analysis at bounds",
@@ -308,7 +319,7 @@ def _inputs(study: Study, bounds: SuiteBounds, scene: Any) -> Table:
     factors, (target, _) = study.inputs.factors[study.axes[-1].paths[0]], _target(study)
     scales = [f"{name} × {float(study.inputs.records[name].get('scale', 1.0)):.4g}" for name in bounds.records]
     rows = [
-        ("bearings", "; ".join(f"{n} × {kind}" for kind, n in Counter(map(kind_of, scene.every_bearing)).items())),
+        ("bearings", "; ".join(f"{n} × {kind}" for kind, n in Counter(map(bearing_kind, scene.every_bearing)).items())),
         ("load at rest", f"{loads.sum():.4g} MN{f' on {len(loads)} bearings' if each else ''}{each}"),
         *_frictions(study),
         ("bounds", f"{factors.name}: {factors.description}".rstrip(": ")),
@@ -476,7 +487,7 @@ def _plot_spectra(
     with page(9.5, 4.6) as figure:
         headline(figure, "Spectra of the scaled ground motions")
         row = panels(figure, f"horizontal, {component}", "vertical")
-        colours = distinct(len(horizontal))
+        colours = distinct_colours(len(horizontal))
         for axes, spectra in zip(row, (horizontal, vertical), strict=True):
             for (name, values), colour in zip(spectra.items(), colours, strict=True):
                 axes.plot(PERIODS, values, color=colour, linewidth=THIN, label=plain(name))

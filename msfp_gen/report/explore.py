@@ -19,7 +19,7 @@ from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.figures.style import colour
 from msfp_gen.jit.build import runtime_sources
-from msfp_gen.jit.compiler import FLAGS, Log, Step, zig_program
+from msfp_gen.jit.compiler import FLAGS, BuildStep, Log, zig_program
 from msfp_gen.report.frames import asset, pieces, render, script_data, write_page
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.bearing import Bearing
@@ -90,7 +90,7 @@ def problem_of(scene: Scene, title: str) -> Problem:
         "outlines": [pieces(fixed.bearing, body) for body in range(fixed.bearing.layout.n)],
         "colours": [colour(surface) for surface in range(1, fixed.bearing.layout.surfaces + 1)],
         "axialLoad": fixed.top.axial_load if isinstance(fixed.top, RigTop) and fixed.load is None else None,
-        "kind": str(fixed.motion.metadata.get("kind", "")) if hasattr(fixed.motion, "metadata") else "",
+        "kind": str(fixed.motion.metadata.get("kind", "")),
         "record": fixed.motion.sampled,
         "amplitude": float(np.abs(fixed.motion.displacement(np.linspace(0.0, fixed.end, 4001))[:, :2]).max()),
         "period": float(str(period)) if (period := fixed.motion.metadata.get("period")) is not None else None,
@@ -257,5 +257,5 @@ def wasm_module(spec: ModelSpec) -> bytes:
         for name, text in sources.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         command = (str(zig), "cc", *TARGET, *flags, f"-Wl,-z,stack-size={STACK}", *units, "-o", OUTPUT)
-        Log(Path(folder)).run(Step(OUTPUT, command))
+        Log(Path(folder)).run(BuildStep(OUTPUT, command))
         return (Path(folder) / OUTPUT).read_bytes()

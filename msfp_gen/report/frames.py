@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, Indices
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.common.tables import Table
 from msfp_gen.common.version import __version__
@@ -36,7 +35,6 @@ FRAMES = 1500  # instants; 0.5 kB each for a triple pendulum, and more than a sc
 FEWEST = 600  # least number of instants, so that the motion looks continuous
 ARC = 20  # points on the profile of a spherical face
 STATES = ("sticks", "slides", "rim contact", "separated")
-Rows = NDArray[np.intp]
 
 
 def view(result: Result, count: int = FRAMES) -> dict[str, Any]:
@@ -89,7 +87,7 @@ def instants(result: Result, count: int = FRAMES) -> Array:
     return np.union1d(time, np.linspace(time[0], time[-1], FEWEST)) if len(time) < FEWEST else time
 
 
-def selected_rows(result: Result, count: int = FRAMES) -> Rows:
+def selected_rows(result: Result, count: int = FRAMES) -> Indices:
     """Increasing row numbers of the view: evenly in time, with the ends, all peaks, and first events of each kind."""
     history = result.history
     time = history.time

@@ -27,7 +27,7 @@ from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.explain import explain
 from msfp_gen.studies.calibration import Fit, FittedTest
-from msfp_gen.studies.calibration.fit_result import correlation_table, estimate_table, residual_table
+from msfp_gen.studies.calibration.fit_result import correlation_table, fitted_values_table, residual_table
 from msfp_gen.studies.calibration.intervals import lag_one
 
 MILLI, KILO = 1e3, 1e-3
@@ -83,7 +83,7 @@ class TitleBlock:
         return [("code edition" if name == "code" else name, text) for name, text in entries.items() if text]
 
 
-def kind_of(bearing: Bearing) -> str:
+def bearing_kind(bearing: Bearing) -> str:
     """The kind of a bearing by its sliding surfaces, with its layout."""
     layout = bearing.layout
     kind = DEVICES.get(layout.surfaces)
@@ -251,7 +251,7 @@ def report_html(
     page = page_of(result)
     data = page.view(result, frames)
     shown, rows = data["frames"]["time"]["shape"][0], len(result.bearings[0].history.time)
-    device = ", ".join(dict.fromkeys(map(kind_of, result.scene.every_bearing)))
+    device = ", ".join(dict.fromkeys(map(bearing_kind, result.scene.every_bearing)))
     return render(
         "page.html.jinja",
         moving=f"The {page.name} in motion",
@@ -365,7 +365,7 @@ def _count(number: int, noun: str) -> str:
 
 def _values(fit: Fit) -> Table:
     """The table of estimates with the change from the start and the bounds."""
-    table = estimate_table(fit)
+    table = fitted_values_table(fit)
     rows = [
         (
             *row,

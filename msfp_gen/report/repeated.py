@@ -92,7 +92,7 @@ def repeated(study: Study, bounds: SuiteBounds, rows: Any, progress: Progress | 
     most = min(tightened.max_steps, int(MOST_STEPS * chosen[tight]["steps"]))
     finer = replace(scenes[tight], solver=replace(tightened, max_steps=most))
     with closing(completed_runs([*scenes, *level, finer], progress=progress)) as runs:
-        ended = {index: result for index, result in runs if getattr(result, "status", "") == "ok"}
+        ended = {index: result for index, result in runs if result.status == "ok"}
     without = {index: ended.get(len(scenes) + place) for place, index in enumerate(moved)}
     found = []
     for index, row in enumerate(chosen):

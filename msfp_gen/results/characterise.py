@@ -21,7 +21,7 @@ from msfp_gen.results.summary import is_monotonic, transitions
 if TYPE_CHECKING:
     from msfp_gen.results.result import Result
 
-Kind = Literal["cycles", "monotonic", "one direction", "two directions"]
+LoadingKind = Literal["cycles", "monotonic", "one direction", "two directions"]
 CSV_SUFFIXES = (".csv",)
 
 
@@ -57,7 +57,7 @@ DEMAND_COLUMNS = {
     "uplift [mm]": ("maximum_uplift", 1e3, ".4g"),
 }
 TIMES = {"start [s]", "end [s]"}  # columns that have no envelope
-Row = dict[str, float | str | None]
+CycleRow = dict[str, float | str | None]
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Characterisation:
 
     name: str
     status: str
-    kind: Kind
+    kind: LoadingKind
     direction: tuple[float, float]
     axial_load: float | None
     cycles: tuple[Cycle, ...]
@@ -232,7 +232,7 @@ def loop_quantity(cycle: Cycle, name: str) -> float | None:
     return value
 
 
-def write_csv(characterisation: Characterisation, path: str | Path) -> Path:
+def write_characterisation(characterisation: Characterisation, path: str | Path) -> Path:
     """Write one row per cycle, then least, mean and largest values of the cycles, then the run, to a CSV file.
 
     The file appears only when complete. Raises InputError for a path that does not end in .csv or cannot be written.
@@ -240,10 +240,10 @@ def write_csv(characterisation: Characterisation, path: str | Path) -> Path:
     return write_rows(check_output(path, CSV_SUFFIXES), csv_rows(characterisation))
 
 
-def csv_rows(characterisation: Characterisation) -> list[Row]:
-    """The rows of `write_csv`: column with its unit -> value; None and missing columns are empty cells."""
+def csv_rows(characterisation: Characterisation) -> list[CycleRow]:
+    """The rows of `write_characterisation`: column with its unit -> value; None and missing columns are empty cells."""
     cycles = [{"scope": f"cycle {cycle.number}", **_cycle_row(cycle)} for cycle in characterisation.cycles]
-    whole: Row = {
+    whole: CycleRow = {
         "scope": "run",
         "peak_displacement [m]": characterisation.peak_displacement,
         "peak_force [N]": characterisation.peak_force,
@@ -255,14 +255,14 @@ def csv_rows(characterisation: Characterisation) -> list[Row]:
     return [*cycles, *_envelope_rows(cycles), whole]
 
 
-def _envelope_rows(cycles: list[Row]) -> Iterator[Row]:
+def _envelope_rows(cycles: list[CycleRow]) -> Iterator[CycleRow]:
     kinds: dict[str, Callable[[list[float]], float]] = {
         "least": min,
         "mean": lambda values: sum(values) / len(values),
         "most": max,
     }
     for scope, pick in kinds.items() if cycles else ():
-        row: Row = {"scope": scope}
+        row: CycleRow = {"scope": scope}
         for name in (key for key in cycles[0] if key not in TIMES):
             values = [value for cycle in cycles if isinstance(value := cycle.get(name), float)]
             if values and len(values) == len(cycles):
@@ -270,9 +270,9 @@ def _envelope_rows(cycles: list[Row]) -> Iterator[Row]:
         yield row
 
 
-def _cycle_row(cycle: Cycle) -> Row:
+def _cycle_row(cycle: Cycle) -> CycleRow:
     loop = cycle.loop
-    row: Row = {
+    row: CycleRow = {
         "start [s]": cycle.start,
         "end [s]": cycle.end,
         "displacement_most [m]": loop.displacement_most,
@@ -283,11 +283,11 @@ def _cycle_row(cycle: Cycle) -> Row:
         "balance_energy [J]": cycle.balance_energy,
     }
     stages = cycle.stage_stiffness().items()
-    stiffness: Row = {f"stiffness sliding on {_joined(surfaces)} [N/m]": value for surfaces, value in stages}
+    stiffness: CycleRow = {f"stiffness sliding on {_joined(surfaces)} [N/m]": value for surfaces, value in stages}
     return row | stiffness | _demand_row(cycle.surfaces)
 
 
-def _demand_row(demands: tuple[SurfaceDemand, ...]) -> Row:
+def _demand_row(demands: tuple[SurfaceDemand, ...]) -> CycleRow:
     return {
         f"{name}_{demand.surface} [{unit}]": getattr(demand, name)
         for demand in demands
@@ -404,7 +404,7 @@ def characterised(
         for number, (start, middle, end, loop) in enumerate(path.cycles(), 1)
     )
     surfaces, straight = demands(None), path.straight
-    kind: Kind = "cycles" if cycles else "one direction" if straight else "two directions"
+    kind: LoadingKind = "cycles" if cycles else "one direction" if straight else "two directions"
     uplifts = [demand.maximum_uplift for demand in surfaces if demand.maximum_uplift is not None]
     return Characterisation(
         name=name,
@@ -446,7 +446,7 @@ def _envelope(cycles: Sequence[Cycle]) -> dict[str, Range]:
 REMEDY = "give motion.hold, such as 20 s, for time without motion in which it comes to rest"
 
 
-def _notes(kind: Kind, path: ForcePath, demands: Sequence[SurfaceDemand], regimes: bool) -> list[str]:
+def _notes(kind: LoadingKind, path: ForcePath, demands: Sequence[SurfaceDemand], regimes: bool) -> list[str]:
     """Which quantities this run does not define, and why. regimes: whether the sliding regimes are known."""
     notes = []
     if kind == "two directions":

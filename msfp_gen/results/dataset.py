@@ -34,7 +34,7 @@ from msfp_gen.results.history import (
     Event,
     Extremes,
     History,
-    quantities,
+    row_fields,
 )
 from msfp_gen.results.note import Note
 from msfp_gen.results.stored_group import Attribute, StoredGroup
@@ -46,7 +46,7 @@ from msfp_gen.results.variables import (
     column_places,
     dataset_of,
     digest_of_names,
-    labelled,
+    label_coordinates,
     stored_fields,
 )
 from msfp_gen.scene.parameters import Parameter
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 
 def _rows() -> Iterator[tuple[str, Variable]]:
     """Every quantity of the rows: several variables where each of its components has a name. Then every energy."""
-    for field, rows in quantities().items():
+    for field, rows in row_fields().items():
         dims, several = ("time", *rows.dims), len(rows.names) > 1
         for index, name in enumerate(rows.names or (field,)):
             part: Any = {"dims": dims[:-1], "part": (..., index), "whole": dims} if several else {"dims": dims}
@@ -90,7 +90,9 @@ BELOW = {  # of a bearing of a building
 def to_dataset(result: Result) -> xr.Dataset:
     """The rows of `result` along `time`, its events along `event`; scene, status and provenance in the attributes."""
     about = _attributes(result) if result.mounting is None else _attributes_below(result, result.mounting)
-    return dataset_of(VARIABLES | BELOW, arrays_of(result), labelled(labels_of(result.history.surfaces)), about)
+    return dataset_of(
+        VARIABLES | BELOW, arrays_of(result), label_coordinates(labels_of(result.history.surfaces)), about
+    )
 
 
 def arrays_of(result: Result) -> Arrays:
@@ -166,7 +168,7 @@ def fields_in(root: StoredGroup, about: Mapping[str, Attribute]) -> dict[str, An
     variables = {name: v for name, v in VARIABLES.items() if v.field not in OPTIONAL or name in root}
     read = stored_fields(root, variables, sizes)
     energy = {name: read.pop(f"energy_{name}") for name in ENERGY}
-    history = History(**{field: read[field] for field in quantities() if field in read}, energy=energy)
+    history = History(**{field: read[field] for field in row_fields() if field in read}, energy=energy)
     return {
         "scene": scene,
         "history": history,
@@ -186,7 +188,7 @@ def _gradients(root: StoredGroup, sizes: dict[str, int]) -> Gradients | None:
     attributes = group.attributes(lambda name: name in ("parameters", "extremes", f"extremes{ERROR}"))
     parameters = tuple(_parameter(table) for table in json.loads(str(attributes["parameters"])))
     sizes = {**sizes, PARAMETER: len(parameters)}
-    quantity = {name for name, variable in ROWS.items() if variable.field in quantities()} - {"time"}
+    quantity = {name for name, variable in ROWS.items() if variable.field in row_fields()} - {"time"}
     terms = energy_terms("energy_input" in group, "energy_seat_stored" in group)
     energies = [f"energy_{name}" for name in terms]
 
@@ -284,7 +286,7 @@ def to_gradient_dataset(result: Result) -> xr.Dataset:
         errors = {f"{name}{ERROR}": v._replace(field=f"{v.field}{ERROR}") for name, v in variables.items()}
         variables |= {name: v._replace(meaning=f"error of the {v.meaning}") for name, v in errors.items()}
         arrays |= {f"{field}{ERROR}": values for field, values in gradients.error.arrays.items()}
-    return dataset_of(variables, arrays, labelled(labels_of(result.history.surfaces)) | coordinates, {})
+    return dataset_of(variables, arrays, label_coordinates(labels_of(result.history.surfaces)) | coordinates, {})
 
 
 def _derivative(variable: Variable) -> Variable:

@@ -282,7 +282,7 @@ class Plane:
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class StackSection:
     """Section of one row. Coordinates [m]: along the plane from the centre of the base, and above its lower face.
 
     Attributes:
@@ -303,7 +303,7 @@ class Section:
     forces: Array
 
 
-def sections(result: Result, azimuth: float | None = None) -> list[Section]:
+def sections(result: Result, azimuth: float | None = None) -> list[StackSection]:
     """The section of `result` in every row, along `azimuth` [rad] from E1; None: along the largest displacement.
 
     The plane passes through the mean position of the sliders, so that it also cuts all bodies of a stack that has moved
@@ -323,7 +323,7 @@ def sections(result: Result, azimuth: float | None = None) -> list[Section]:
         branches = [cut(face, bottom[k], basis[k], plane) for k, face in faces]
         arcs = [np.concatenate([left[::-1], right]) for left, right in branches]
         projected = (stack.contact, stack.centre, stack.line, stack.force)
-        sections.append(Section(angle, bodies, arcs, *(plane.project(x[row]) for x in projected)))
+        sections.append(StackSection(angle, bodies, arcs, *(plane.project(x[row]) for x in projected)))
     return sections
 
 

@@ -7,7 +7,7 @@ here and the dataset in `dataset.py` are based on them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Annotated, Any, ClassVar, Literal, get_origin, get_type_hints
 
@@ -62,8 +62,8 @@ def first_peak(size: Array) -> int:
 
 
 @dataclass(frozen=True)
-class Rows:
-    """A quantity of the rows: dimensions after time, unit, meaning ({} stands for the name), names in the dataset.
+class RowField:
+    """A field of the rows: dimensions after time, unit, meaning ({} stands for the name), names in the dataset.
 
     names: none for the name of the field itself; several for the components of the last dimension.
     """
@@ -85,22 +85,24 @@ class BearingRows:
 
     ENERGIES: ClassVar[Mapping[str, str]] = ENERGY_BELOW
 
-    time: Annotated[Array, Rows((), "s", "time t")]
-    normal_force: Annotated[Array, Rows(("surface",), "N", "normal force N on the surface")]
-    sliding: Annotated[Array, Rows(("surface",), "m", "distance s from the centre of the surface (3.20)")]
-    gap: Annotated[Array, Rows(("surface",), "m", "gap g to the rim (3.21)")]
-    rim_force: Annotated[Array, Rows(("surface",), "N", "force F_c of the rim (2.103)")]
-    lift: Annotated[Array, Rows(("surface",), "m", "clearance between separated faces; 0 while in contact")]
-    base_displacement: Annotated[Array, Rows(("axis",), "m", "displacement u_g of the base")]
+    time: Annotated[Array, RowField((), "s", "time t")]
+    normal_force: Annotated[Array, RowField(("surface",), "N", "normal force N on the surface")]
+    sliding: Annotated[Array, RowField(("surface",), "m", "distance s from the centre of the surface (3.20)")]
+    gap: Annotated[Array, RowField(("surface",), "m", "gap g to the rim (3.21)")]
+    rim_force: Annotated[Array, RowField(("surface",), "N", "force F_c of the rim (2.103)")]
+    lift: Annotated[Array, RowField(("surface",), "m", "clearance between separated faces; 0 while in contact")]
+    base_displacement: Annotated[Array, RowField(("axis",), "m", "displacement u_g of the base")]
     displacement: Annotated[
-        Array, Rows(("axis",), "m", "displacement u across the bearing, r_01 - r_nn less its start")
+        Array, RowField(("axis",), "m", "displacement u across the bearing, r_01 - r_nn less its start")
     ]
-    top_force: Annotated[Array, Rows(("axis",), "N", "force F_top of the bearing on the top support")]
-    top_moment: Annotated[Array, Rows(("axis",), "N m", "moment of the bearing on the top support at r_nn")]
+    top_force: Annotated[Array, RowField(("axis",), "N", "force F_top of the bearing on the top support")]
+    top_moment: Annotated[Array, RowField(("axis",), "N m", "moment of the bearing on the top support at r_nn")]
     # None where the friction does not depend on it.
-    temperature: Annotated[Array | None, Rows(("surface",), "degC", "temperature at the centre of the surface")] = None
+    temperature: Annotated[Array | None, RowField(("surface",), "degC", "temperature at the centre of the surface")] = (
+        None
+    )
     memory: Annotated[
-        Array | None, Rows(("surface",), "", "other state of the surface on which its friction law depends")
+        Array | None, RowField(("surface",), "", "other state of the surface on which its friction law depends")
     ] = None
     energy: dict[str, Array]
 
@@ -112,7 +114,7 @@ class BearingRows:
             before, here = self.time[row - 1 : row + 1]
             raise InputError(f"history.time[{row}] = {here:g} s follows {before:g} s: give rows in rising time")
         for name, values in self.arrays().items():
-            self._check(name, values, self._shape(quantities()[name].dims, self.surfaces))
+            self._check(name, values, self._shape(row_fields()[name].dims, self.surfaces))
         if set(self.energy) != set(self.ENERGIES):
             raise InputError(f"history.energy has {sorted(self.energy)}: give {sorted(self.ENERGIES)}")
         for name, values in self.energy.items():
@@ -135,9 +137,9 @@ class BearingRows:
         return lost
 
     def arrays(self) -> dict[str, Array]:
-        """The arrays of this run by field, without those that are None; see `quantities` for shapes and units."""
-        arrays = {name: getattr(self, name, None) for name in quantities()}
-        return {name: values for name, values in arrays.items() if values is not None}
+        """The arrays of this run by field, without those that are None; see `row_fields` for shapes and units."""
+        own = [field.name for field in fields(self) if field.name in row_fields()]
+        return {name: values for name in own if (values := getattr(self, name)) is not None}
 
     @property
     def horizontal(self) -> Array:
@@ -181,29 +183,33 @@ class History(BearingRows):
 
     ENERGIES: ClassVar[Mapping[str, str]] = ENERGY
 
-    tilt_angles: Annotated[Array, Rows(("body", "angle"), "rad", "psi, theta, phi of body k (2.27)", ("tilt",))]
-    tilt_rates: Annotated[Array, Rows(("body", "angle"), "rad/s", "rates of psi, theta, phi", ("tilt_rate",))]
+    tilt_angles: Annotated[Array, RowField(("body", "angle"), "rad", "psi, theta, phi of body k (2.27)", ("tilt",))]
+    tilt_rates: Annotated[Array, RowField(("body", "angle"), "rad/s", "rates of psi, theta, phi", ("tilt_rate",))]
     tilt_accelerations: Annotated[
-        Array, Rows(("body", "angle"), "rad/s^2", "second derivatives of psi, theta, phi", ("tilt_acceleration",))
+        Array, RowField(("body", "angle"), "rad/s^2", "second derivatives of psi, theta, phi", ("tilt_acceleration",))
     ]
-    friction_state: Annotated[Array, Rows(("surface", "direction"), "1", "Bouc-Wen variable {} (2.94)", ("Y", "Z"))]
-    contact_angles: Annotated[Array, Rows(("surface", "contact_angle"), "rad", "psi~, theta~ of the contact (2.86)")]
+    friction_state: Annotated[Array, RowField(("surface", "direction"), "1", "Bouc-Wen variable {} (2.94)", ("Y", "Z"))]
+    contact_angles: Annotated[
+        Array, RowField(("surface", "contact_angle"), "rad", "psi~, theta~ of the contact (2.86)")
+    ]
     separation: Annotated[
-        Array, Rows(("surface", "axis"), "m", "separation delta of the two sphere centres of the surface")
+        Array, RowField(("surface", "axis"), "m", "separation delta of the two sphere centres of the surface")
     ]
-    interface_force: Annotated[Array, Rows(("surface", "axis"), "N", "force P through the surface")]
-    slip_velocity: Annotated[Array, Rows(("surface", "direction"), "m/s", "slip velocity u~, v~ (2.98)")]
-    top_displacement: Annotated[Array, Rows(("axis",), "m", "position r_nn of the top plate in space")]
+    interface_force: Annotated[Array, RowField(("surface", "axis"), "N", "force P through the surface")]
+    slip_velocity: Annotated[Array, RowField(("surface", "direction"), "m/s", "slip velocity u~, v~ (2.98)")]
+    top_displacement: Annotated[Array, RowField(("axis",), "m", "position r_nn of the top plate in space")]
     # None unless the model has a friction law.
-    friction_coefficient: Annotated[Array | None, Rows(("surface",), "1", "friction coefficient mu by its law")] = None
+    friction_coefficient: Annotated[Array | None, RowField(("surface",), "1", "friction coefficient mu by its law")] = (
+        None
+    )
     # None unless the top has a vertical stiffness or damping.
     top_settlement: Annotated[
-        Array | None, Rows((), "m", "compression of the vertical spring of the top, settlement of a supported mass")
+        Array | None, RowField((), "m", "compression of the vertical spring of the top, settlement of a supported mass")
     ] = None
 
 
 @cache
-def quantities() -> dict[str, Rows]:
+def row_fields() -> dict[str, RowField]:
     """The description of each array of `History`, by field."""
     hints = get_type_hints(History, include_extras=True)
     return {name: hint.__metadata__[0] for name, hint in hints.items() if get_origin(hint) is Annotated}

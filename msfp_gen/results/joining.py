@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
-from msfp_gen.results.history import History, quantities
+from msfp_gen.results.history import History, row_fields
 
 Ends = tuple[History, History]
 
@@ -61,7 +61,7 @@ class Joint:
             return rows
         recorded, last = rows.arrays(), self._first[-1].arrays()
         missing = {name: self._before.get(name, last[name][0]) for name in last if name not in recorded}
-        columns: dict[str, Any] = dict.fromkeys(quantities())
+        columns: dict[str, Any] = dict.fromkeys(row_fields())
         columns |= {name: recorded[name] for name in last if name in recorded}
         columns |= {name: np.tile(value, (len(rows.time), 1)) for name, value in missing.items()}
         start = self._first[0]

@@ -11,7 +11,7 @@ from msfp_gen.scene.scene import Scene
 Side = Literal["most", "least", ""]
 
 
-class Quantity(NamedTuple):
+class RunQuantity(NamedTuple):
     """A quantity of a run.
 
     path: dotted path of the value in the summary, or in the characterisation if `characterised`; `.*` stands for each
@@ -43,71 +43,75 @@ class Quantity(NamedTuple):
 
 
 RUN = {
-    "status": Quantity("", "status"),
-    "message": Quantity("", "message"),
-    "duration": Quantity("s", "duration", extreme="most"),
-    "peak_displacement": Quantity("m", "peak_displacement.radial", "most", kept=True),
-    "peak_force": Quantity("N", "peak_force.radial", "most", kept=True),
-    "peak_force_ratio": Quantity("", "peak_force_ratio", extreme="most"),
-    "rims_met": Quantity("", "rims_met", kept=True),
-    "verdict": Quantity("", "verdict.word"),
-    "verdict_text": Quantity("", "verdict.text"),
-    "limits_exceeded": Quantity("", "verdict.limits", kept=True),
-    "limits_reached": Quantity("", "verdict.largest"),  # as JSON: of every limit the value largest over what is allowed
-    "closure_error": Quantity("", "energy.closure_error"),
-    "steps": Quantity("", "counters.steps", extreme="most"),
-    "wall_time": Quantity("s", "wall_time"),
-    "secant_stiffness": Quantity("N/m", "secant_stiffness", characterised=True),
-    "energy_dissipated": Quantity("J", "energy_dissipated", characterised=True, extreme="most"),
-    "residual_displacement": Quantity(
+    "status": RunQuantity("", "status"),
+    "message": RunQuantity("", "message"),
+    "duration": RunQuantity("s", "duration", extreme="most"),
+    "peak_displacement": RunQuantity("m", "peak_displacement.radial", "most", kept=True),
+    "peak_force": RunQuantity("N", "peak_force.radial", "most", kept=True),
+    "peak_force_ratio": RunQuantity("", "peak_force_ratio", extreme="most"),
+    "rims_met": RunQuantity("", "rims_met", kept=True),
+    "verdict": RunQuantity("", "verdict.word"),
+    "verdict_text": RunQuantity("", "verdict.text"),
+    "limits_exceeded": RunQuantity("", "verdict.limits", kept=True),
+    "limits_reached": RunQuantity(
+        "", "verdict.largest"
+    ),  # as JSON: of every limit the value largest over what is allowed
+    "closure_error": RunQuantity("", "energy.closure_error"),
+    "steps": RunQuantity("", "counters.steps", extreme="most"),
+    "wall_time": RunQuantity("s", "wall_time"),
+    "secant_stiffness": RunQuantity("N/m", "secant_stiffness", characterised=True),
+    "energy_dissipated": RunQuantity("J", "energy_dissipated", characterised=True, extreme="most"),
+    "residual_displacement": RunQuantity(
         "m", "residual_displacement", "most", characterised=True, at_rest=True, extreme=""
     ),
     # means over the cycles
-    "effective_stiffness": Quantity("N/m", "envelope.effective_stiffness.mean", characterised=True),
-    "effective_period": Quantity("s", "envelope.effective_period.mean", characterised=True),
-    "effective_damping": Quantity("", "envelope.effective_damping.mean", characterised=True),
-    "zero_displacement_force": Quantity("N", "envelope.zero_displacement_force.mean", characterised=True),
+    "effective_stiffness": RunQuantity("N/m", "envelope.effective_stiffness.mean", characterised=True),
+    "effective_period": RunQuantity("s", "envelope.effective_period.mean", characterised=True),
+    "effective_damping": RunQuantity("", "envelope.effective_damping.mean", characterised=True),
+    "zero_displacement_force": RunQuantity("N", "envelope.zero_displacement_force.mean", characterised=True),
 }
 BEARING = RUN | {
-    "axial_load": Quantity("N", "axial_load"),
-    "peak_input_energy": Quantity("J", "energy.peak_input", extreme="most"),
-    "dissipated_share": Quantity("", "energy.dissipated_share"),
-    "capacity_used": Quantity("", "capacity_used.*", extreme="most"),  # 1 where a slider meets its rim
-    "peak_sliding": Quantity("m", "peak_sliding.*", kept=True, extreme="most"),
-    "minimum_gap": Quantity("m", "minimum_gap.*", extreme="least"),
-    "minimum_normal_force": Quantity("N", "minimum_normal_force.*", extreme="least"),
-    "minimum_load_ratio": Quantity("", "minimum_load_ratio", "least", words="least normal force over the load at rest"),
-    "maximum_normal_force": Quantity("N", "maximum_normal_force.*", extreme="most"),
-    "least_friction": Quantity("", "least_friction.*", extreme="least"),
-    "most_friction": Quantity("", "most_friction.*", extreme="most"),
-    "peak_temperature": Quantity("degC", "peak_temperature.*", extreme="most"),
-    "peak_rim_force": Quantity("N", "peak_rim_force.*", extreme="most"),
-    "uplift_height": Quantity("m", "uplift.height", extreme="most"),
-    "uplift_duration": Quantity("s", "uplift.duration", extreme="most"),
-    "maximum_uplift": Quantity("m", "maximum_uplift", "most", characterised=True),
-    "capacity_left": Quantity("m", "surfaces.*.capacity_left", "least", characterised=True),
-    "peak_velocity": Quantity("m/s", "surfaces.*.peak_velocity", "most", characterised=True),
-    "peak_heat_flux": Quantity("W/m^2", "surfaces.*.peak_heat_flux", "most", characterised=True),
+    "axial_load": RunQuantity("N", "axial_load"),
+    "peak_input_energy": RunQuantity("J", "energy.peak_input", extreme="most"),
+    "dissipated_share": RunQuantity("", "energy.dissipated_share"),
+    "capacity_used": RunQuantity("", "capacity_used.*", extreme="most"),  # 1 where a slider meets its rim
+    "peak_sliding": RunQuantity("m", "peak_sliding.*", kept=True, extreme="most"),
+    "minimum_gap": RunQuantity("m", "minimum_gap.*", extreme="least"),
+    "minimum_normal_force": RunQuantity("N", "minimum_normal_force.*", extreme="least"),
+    "minimum_load_ratio": RunQuantity(
+        "", "minimum_load_ratio", "least", words="least normal force over the load at rest"
+    ),
+    "maximum_normal_force": RunQuantity("N", "maximum_normal_force.*", extreme="most"),
+    "least_friction": RunQuantity("", "least_friction.*", extreme="least"),
+    "most_friction": RunQuantity("", "most_friction.*", extreme="most"),
+    "peak_temperature": RunQuantity("degC", "peak_temperature.*", extreme="most"),
+    "peak_rim_force": RunQuantity("N", "peak_rim_force.*", extreme="most"),
+    "uplift_height": RunQuantity("m", "uplift.height", extreme="most"),
+    "uplift_duration": RunQuantity("s", "uplift.duration", extreme="most"),
+    "maximum_uplift": RunQuantity("m", "maximum_uplift", "most", characterised=True),
+    "capacity_left": RunQuantity("m", "surfaces.*.capacity_left", "least", characterised=True),
+    "peak_velocity": RunQuantity("m/s", "surfaces.*.peak_velocity", "most", characterised=True),
+    "peak_heat_flux": RunQuantity("W/m^2", "surfaces.*.peak_heat_flux", "most", characterised=True),
 }
 
 
 MOVING = "the run ends while the bearing still moves: give motion.hold, such as 20 s, for time without motion"
 
 
-class Source(NamedTuple):
+class ColumnSource(NamedTuple):
     """Where the value of a column comes from: a quantity of the run, or of one of its parts.
 
     place: index from 0 of the surface, floor, storey or bearing; None: of the run. part: name of that part in messages.
     """
 
-    quantity: Quantity
+    quantity: RunQuantity
     place: int | None = None
     part: str = ""
 
     def reason(self, characterisation: Any) -> str:
         """Why a characterised run has no value of the quantity; "" where no reason is known."""
-        rests = getattr(characterisation, "at_rest", True)
-        return "" if rests or not self.quantity.at_rest else MOVING
+        moving = characterisation is not None and not characterisation.at_rest
+        return MOVING if moving and self.quantity.at_rest else ""
 
     def words(self, column: str) -> str:
         """The quantity in words, with the name of its part. column: its name."""
@@ -128,7 +132,7 @@ class Source(NamedTuple):
         characterisation: of the run; None where it is not needed, or not possible.
         """
         quantity = self.quantity
-        if quantity.at_rest and not getattr(characterisation, "at_rest", False):
+        if quantity.at_rest and (characterisation is None or not characterisation.at_rest):
             return None
         if quantity.characterised:
             value = value_at(characterisation, quantity.path)
@@ -141,30 +145,32 @@ class Source(NamedTuple):
 
 
 @singledispatch
-def quantities(system: Any) -> dict[str, Source]:
+def quantities(system: Any) -> dict[str, ColumnSource]:
     """Column of a table -> where its value comes from in the result of a system."""
-    sources: dict[str, Source] = system.quantities()
+    sources: dict[str, ColumnSource] = system.quantities()
     return sources
 
 
 @quantities.register(Scene)
-def _quantities_of_bearing(scene: Scene) -> dict[str, Source]:
+def _quantities_of_bearing(scene: Scene) -> dict[str, ColumnSource]:
     return sources_of(BEARING, {}, len(scene.bearing.surfaces))
 
 
-def sources_of(table: Mapping[str, Quantity], parts: Mapping[str, Sequence[str]], surfaces: int) -> dict[str, Source]:
+def sources_of(
+    table: Mapping[str, RunQuantity], parts: Mapping[str, Sequence[str]], surfaces: int
+) -> dict[str, ColumnSource]:
     """Column -> source of every quantity of a table; one for each part of a quantity of several.
 
     parts: names of the floors, storeys or bearings. surfaces: number of surfaces, for all other quantities of several.
     """
-    sources: dict[str, Source] = {}
+    sources: dict[str, ColumnSource] = {}
     for name, quantity in table.items():
         head, several, _ = quantity.path.partition(".*")
         if not several:
-            sources[name] = Source(quantity)
+            sources[name] = ColumnSource(quantity)
             continue
         labels = parts.get(head) or [f"surface {number}" for number in range(1, surfaces + 1)]
-        sources |= {f"{name}_{index + 1}": Source(quantity, index, label) for index, label in enumerate(labels)}
+        sources |= {f"{name}_{index + 1}": ColumnSource(quantity, index, label) for index, label in enumerate(labels)}
     return sources
 
 

@@ -20,7 +20,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.later import Later
-from msfp_gen.common.tables import Printed, Rows, Table
+from msfp_gen.common.tables import LabelledValues, Printed, Table
 from msfp_gen.results import dataset, files
 from msfp_gen.results.characterise import Characterisation
 from msfp_gen.results.characterise import characterise as characterise_bearing
@@ -34,7 +34,7 @@ from msfp_gen.results.summary import (
     summarise,
     summarise_gradients,
     summary_of_bearing,
-    surface_table,
+    surface_peaks_table,
     time_row,
     transition_table,
     work_rows,
@@ -168,7 +168,7 @@ class AnyResult(Printed):
         """Effective properties and demands. Raises InputError where nothing moved."""
 
     @abstractmethod
-    def main_results(self) -> Rows:
+    def main_results(self) -> LabelledValues:
         """Label and value of the main results, seven rows at most."""
 
     @property
@@ -185,7 +185,7 @@ class AnyResult(Printed):
     def part_tables(self) -> list[Table]:
         """Tables of the surfaces of a bearing, or of the parts of a building."""
 
-    def work_rows(self) -> Rows:
+    def work_rows(self) -> LabelledValues:
         """Label and value of the energies of the run and of the work of the solver."""
         return []
 
@@ -216,11 +216,11 @@ class AnyResult(Printed):
         return self.status + (f": {self.message}" if self.message else "")
 
     @property
-    def stated_rows(self) -> Rows:
+    def stated_rows(self) -> LabelledValues:
         """Label and value of the main results after the status and the verdict."""
         return [("status", self.status_text), ("verdict", self.verdict.text), *self.main_results()]
 
-    def printed_rows(self) -> tuple[str, Rows]:
+    def printed_rows(self) -> tuple[str, LabelledValues]:
         """Name, and `stated_rows` with the first notes, in nine rows at most."""
         lines, others = self.first_notes
         more = f"; {others} more in .notes" if others else ""
@@ -445,7 +445,7 @@ class Result(AnyResult):
             return self.verdict.as_dict
         return self.of_bearing[key] if key in self.of_bearing else super().entry(key)
 
-    def main_results(self) -> Rows:
+    def main_results(self) -> LabelledValues:
         """Label and value of the main results."""
         if self.mounting is None:
             return rows_of_bearing(self.summary, time_row(self.summary))
@@ -457,7 +457,7 @@ class Result(AnyResult):
         rows = self.history
         return Curve(rows.path[0], rows.top_force[:, :2] @ rows.direction, "force over displacement")
 
-    def work_rows(self) -> Rows:
+    def work_rows(self) -> LabelledValues:
         """Label and value of the energy of the run and of the work of the solver; none below a building."""
         return work_rows(self.summary) if self.mounting is None else []
 
@@ -467,7 +467,7 @@ class Result(AnyResult):
             return []
         changes = self.summary.get("transitions")
         more = [] if changes is None else [transition_table(changes)]
-        return [surface_table(self.summary, self.bearing.surfaces), *more]
+        return [surface_peaks_table(self.summary, self.bearing.surfaces), *more]
 
     def characterise(self) -> Characterisation:
         """Effective stiffness, damping, sliding regimes, remaining capacity, velocity and heat (docs/results.md).

@@ -14,16 +14,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, Flags
 from msfp_gen.results.history import BearingRows, Event, History
 
 SHARE = 0.05  # of the slip of all surfaces together, over an interval
 INSTANT_SHARE = 0.1  # the same at one instant
 MOBILISED = 0.9  # |(Y, Z)|; in steady sliding it is 1 (2.94)
-
-Flags = NDArray[np.bool_]
 
 
 def slip_shares(slip: Array) -> Array:

@@ -17,6 +17,7 @@ from msfp_gen.results.history import BearingRows, History, by_axis
 from msfp_gen.results.sliding import SHARE, merged, open_times, slip_shares
 from msfp_gen.scene.bearing import Surface
 from msfp_gen.scene.parameters import Parameter
+from msfp_gen.scene.top import MassTop
 
 if TYPE_CHECKING:
     from msfp_gen.results.result import AnyResult, Result
@@ -374,7 +375,7 @@ def _ratio_slope(result: Result, parameter: Parameter, slope: float) -> float | 
 def _load_slope(result: Result, parameter: Parameter) -> float:
     """Derivative of `axial_load` with respect to a parameter."""
     scene, name = result.alone.scene, parameter.path
-    gravity, mass = scene.bearing.gravity, float(getattr(scene.top, "mass", 0.0)) if scene.top.kind == "mass" else 0.0
+    gravity, mass = scene.bearing.gravity, scene.top.mass if isinstance(scene.top, MassTop) else 0.0
     slopes = {"top.axial_load": 1.0, "top.force[2]": -1.0, "top.mass": gravity, "bearing.gravity": mass}
     if name == "load.scale" and scene.load is not None:
         return -float(np.asarray(scene.load.coefficients)[0, 2, 0])
@@ -418,7 +419,7 @@ SURFACE_COLUMNS: dict[str, tuple[str, float, str]] = {
 }
 
 
-def surface_table(summary: Mapping[str, Any], surfaces: Sequence[Surface]) -> Table:
+def surface_peaks_table(summary: Mapping[str, Any], surfaces: Sequence[Surface]) -> Table:
     """Peaks of the surfaces of a bearing."""
     values: dict[str, Any] = {
         **summary,

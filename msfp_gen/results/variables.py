@@ -68,14 +68,14 @@ Places = dict[str, tuple[Variable, Any]]  # column of a table -> its variable, a
 def dataset_of(
     variables: Variables, arrays: Mapping[str, Any], coordinates: Arrays, attributes: Mapping[str, Attribute]
 ) -> xr.Dataset:
-    """The dataset of these variables; those without an array are left out. coordinates: see `labelled`."""
+    """The dataset of these variables; those without an array are left out. coordinates: see `label_coordinates`."""
     import xarray as xr
 
     data = {name: (v.dims, v.of(arrays), v.about) for name, v in variables.items() if v.field in arrays}
     return xr.Dataset(data, coordinates, attributes)
 
 
-def labelled(labels: Labels) -> Arrays:
+def label_coordinates(labels: Labels) -> Arrays:
     """The coordinates of labelled dimensions."""
     about = {dim: {"long_name": MEANINGS[dim]} if dim in MEANINGS else {} for dim in labels}
     return {dim: (dim, np.array(x, None if len(x) else str), about[dim]) for dim, x in labels.items()}

@@ -28,7 +28,7 @@ NO_SURFACES = "the surfaces are not judged: the run has one pendulum in their pl
 SCALES = {"N": (1e-3, "kN"), "m": (1e3, "mm")}  # unit -> factor and unit of texts
 
 
-class Value(NamedTuple):
+class ReachedValue(NamedTuple):
     """What was reached: surface from 1, 0: none; time [s], None: not known; the value and what is allowed, in the unit
     of the limit. All are of one instant.
     """
@@ -39,7 +39,7 @@ class Value(NamedTuple):
     allowed: float
 
 
-Reader = Callable[["Result", Limits], Iterable[Value]]
+LimitReader = Callable[["Result", Limits], Iterable[ReachedValue]]
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Limit:
     key: str
     name: str
     unit: str
-    read: Reader
+    read: LimitReader
 
     def shown(self, value: float) -> str:
         """A value with its unit."""
@@ -58,13 +58,13 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Reading:
+class LimitReading:
     """A limit, the bearing, and the value that it reached."""
 
     limit: Limit
     bearing: int
     label: str
-    value: Value
+    value: ReachedValue
 
     @property
     def exceeded(self) -> bool:
@@ -99,7 +99,7 @@ class Verdict:
     that limits of the whole bearing alone are judged.
     """
 
-    readings: tuple[Reading, ...]
+    readings: tuple[LimitReading, ...]
     failure: str = ""
     stopped: float | None = None
     whole: bool = False
@@ -110,14 +110,14 @@ class Verdict:
         return self.word == "within"
 
     @cached_property
-    def exceeded(self) -> tuple[Reading, ...]:
+    def exceeded(self) -> tuple[LimitReading, ...]:
         """The readings beyond their limits."""
         return tuple(reading for reading in self.readings if reading.exceeded)
 
     @cached_property
-    def worst(self) -> dict[str, Reading]:
+    def worst(self) -> dict[str, LimitReading]:
         """Key of a limit -> the reading that is largest over what is allowed."""
-        most: dict[str, Reading] = {}
+        most: dict[str, LimitReading] = {}
         for reading in self.readings:
             key = reading.limit.key
             most[key] = max(most.get(key, reading), reading, key=lambda one: one.share)
@@ -155,7 +155,7 @@ class Verdict:
         """The limits that were exceeded, "" where there is none."""
         return "; ".join(self._line(reading) for reading in self.worst.values() if reading.exceeded)
 
-    def _line(self, reading: Reading) -> str:
+    def _line(self, reading: LimitReading) -> str:
         limit, (_, time, reached, allowed) = reading.limit, reading.value
         others = len({one.bearing for one in self.exceeded if one.limit.key == limit.key}) - 1
         more = f", and {others} other bearing{'s' * (others > 1)}" if others > 0 else ""
@@ -205,7 +205,7 @@ def verdict_of(
     """The verdict of a run. limits: of the scene; None: the defaults. failure, stopped, whole: see `Verdict`."""
     allowed = limits or Limits()
     readings = [
-        Reading(limit, one.number, one.label, value)
+        LimitReading(limit, one.number, one.label, value)
         for one in bearings
         for limit in LIMITS
         if limit.key in OF_WHOLE or not whole
@@ -214,18 +214,18 @@ def verdict_of(
     return Verdict(tuple(readings), failure, stopped, whole)
 
 
-def _by_surface(one: Result, name: str, reached: Array, allowed: Array | float) -> Iterator[Value]:
+def _by_surface(one: Result, name: str, reached: Array, allowed: Array | float) -> Iterator[ReachedValue]:
     """Values of every surface, reached when the extreme `name` was."""
     for j, (value, most) in enumerate(zip(reached, np.broadcast_to(allowed, reached.shape), strict=True)):
-        yield Value(j + 1, float(one.extremes.times[name][j]), float(value), float(most))
+        yield ReachedValue(j + 1, float(one.extremes.times[name][j]), float(value), float(most))
 
 
-def _rim_force(one: Result, limits: Limits) -> Iterator[Value]:
+def _rim_force(one: Result, limits: Limits) -> Iterator[ReachedValue]:
     load = float(one.extremes.most_normal.max()) if one.axial_load is None else one.axial_load
     yield from _by_surface(one, "rim_force", np.asarray(one.extremes.rim_force), limits.rim_force or RIM_SHARE * load)
 
 
-def _rim_compression(one: Result, limits: Limits) -> Iterable[Value]:
+def _rim_compression(one: Result, limits: Limits) -> Iterable[ReachedValue]:
     if not _rims_are_modelled(one):
         return ()  # `beyond_rim` says so
     allowed = limits.rim_compression or COMPRESSION_SHARE * one.bearing.arrays()["capacity"]
@@ -237,12 +237,12 @@ def _rims_are_modelled(one: Result) -> bool:
     return not any(note.kind == "rims" and not note.action for note in one.notes)
 
 
-def _travel(one: Result, limits: Limits) -> Iterator[Value]:
+def _travel(one: Result, limits: Limits) -> Iterator[ReachedValue]:
     """Rims in contact at one time; one surface must be left to slide."""
     # By the contacts that the run has located; a building counts them over all steps.
     allowed = float(len(one.extremes.gap) - 1)
     if one.extremes.rims_met is not None:
-        yield Value(0, float(one.extremes.times["rims_met"][0]), float(one.extremes.rims_met[0]), allowed)
+        yield ReachedValue(0, float(one.extremes.times["rims_met"][0]), float(one.extremes.rims_met[0]), allowed)
         return
     closed = (one.history.gap <= 0) | (one.history.rim_force > 0)
     counts = closed.sum(axis=1)
@@ -256,10 +256,10 @@ def _travel(one: Result, limits: Limits) -> Iterator[Value]:
             met.discard(event.surface)
         if len(met) > most or (len(met) == most and event.time < time):
             most, time = len(met), event.time
-    yield Value(0, time, float(most), allowed)
+    yield ReachedValue(0, time, float(most), allowed)
 
 
-def _uplift_height(one: Result, limits: Limits) -> Iterator[Value]:
+def _uplift_height(one: Result, limits: Limits) -> Iterator[ReachedValue]:
     bearing = one.bearing
     offsets = bearing.arrays()["rim_offset"][[bearing.slider(j) for j in range(len(bearing.surfaces))]]
     allowed = np.full(len(offsets), limits.uplift_height) if limits.uplift_height else offsets
@@ -268,35 +268,35 @@ def _uplift_height(one: Result, limits: Limits) -> Iterator[Value]:
             yield value
 
 
-def _uplift_duration(one: Result, limits: Limits) -> Iterator[Value]:
+def _uplift_duration(one: Result, limits: Limits) -> Iterator[ReachedValue]:
     for surface, spells in enumerate(open_times(one.history, one.events), start=1):
         start, length = max(spells, key=lambda spell: spell[1], default=(0.0, 0.0))
-        yield Value(surface, start, length, limits.uplift_duration)
+        yield ReachedValue(surface, start, length, limits.uplift_duration)
 
 
-def _temperature(one: Result, limits: Limits) -> Iterator[Value]:
+def _temperature(one: Result, limits: Limits) -> Iterator[ReachedValue]:
     """Temperatures of the friction law, or of the monitor of heat where the law has none."""
     if one.extremes.temperature is not None:
         yield from _by_surface(one, "temperature", one.extremes.temperature, limits.temperature)
     for note in one.notes:
         if note.kind == "heat" and not note.action:
             start = float(start_temperatures(one.bearing)[note.surface - 1])
-            yield Value(note.surface, note.value_time, start + note.value, limits.temperature)
+            yield ReachedValue(note.surface, note.value_time, start + note.value, limits.temperature)
 
 
-def _of_bearing(one: Result, limits: Limits, name: str) -> Iterator[Value]:
+def _of_bearing(one: Result, limits: Limits, name: str) -> Iterator[ReachedValue]:
     """The axial load or the displacement of a whole bearing, where a limit is given."""
     extreme, component = {"axial_load": ("top_force", 2), "displacement": ("displacement", 3)}[name]
     if (allowed := getattr(limits, name)) is not None:
         values, times = getattr(one.extremes, extreme), one.extremes.times[extreme]
-        yield Value(0, float(times[component]), float(values[component]), allowed)
+        yield ReachedValue(0, float(times[component]), float(values[component]), allowed)
 
 
-def _beyond_rim(one: Result, limits: Limits) -> Iterator[Value]:
+def _beyond_rim(one: Result, limits: Limits) -> Iterator[ReachedValue]:
     """The largest sliding beyond a capacity that the monitor of rims noted."""
     for note in one.notes:
         if note.kind == "rims" and not note.action:
-            yield Value(note.surface, note.value_time, note.value, 0.0)
+            yield ReachedValue(note.surface, note.value_time, note.value, 0.0)
 
 
 def _radius(bearing: Bearing, surface: int) -> float:
@@ -304,18 +304,18 @@ def _radius(bearing: Bearing, surface: int) -> float:
     return float(bearing.arrays()["rim_radius"][bearing.slider(surface - 1)])
 
 
-def _face(one: Result, limits: Limits) -> Iterator[Value]:
+def _face(one: Result, limits: Limits) -> Iterator[ReachedValue]:
     """Distances as a bearing of a building records them, or as the note of a bearing alone states them."""
     offsets = one.extremes.contact_offset
     if offsets is None:
         for note in one.notes:
             if note.kind == "footprint" and not note.action:
-                yield Value(note.surface, note.value_time, note.value, _radius(one.bearing, note.surface))
+                yield ReachedValue(note.surface, note.value_time, note.value, _radius(one.bearing, note.surface))
         return
     times = one.extremes.times["contact_offset"].tolist()
     for surface, (offset, time) in enumerate(zip(offsets.tolist(), times, strict=True), start=1):
         if (radius := _radius(one.bearing, surface)) > 0:  # else no face is known
-            yield Value(surface, time, offset, radius)
+            yield ReachedValue(surface, time, offset, radius)
 
 
 LIMITS = (

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, paired, require_type
-from msfp_gen.common.tables import Printed, Rows
+from msfp_gen.common.tables import LabelledValues, Printed
 from msfp_gen.scene.sheet import BOUNDS, Sheet
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import Layout
@@ -216,7 +216,7 @@ class Bearing(Printed):
             raise InputError(f"{path} has {len(items)} entries: layout {self.layout.name} needs {count}, {meaning}")
         object.__setattr__(self, name, items)
 
-    def printed_rows(self) -> tuple[str, Rows]:
+    def printed_rows(self) -> tuple[str, LabelledValues]:
         """Layout, and the values of every surface and body, bottom first, in six rows."""
         columns = {"R [m]": "radius", "s_c [m]": "capacity", "mu": "friction", "d_y [m]": "yield_displacement"}
         rows = {label: [getattr(part, name) for part in self.surfaces] for label, name in columns.items()}

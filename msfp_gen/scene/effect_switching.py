@@ -71,7 +71,7 @@ class Ending(NamedTuple):
     trips: Mapping[str, tuple[float, int, float, float]]
 
 
-def check(scene: Requested, effects: Effects) -> None:
+def check_effects(scene: Requested, effects: Effects) -> None:
     """Raise InputError where the method of the scene does not support these effects."""
     if effects.sliders == "massless" and scene.solver.method == "dopri5":
         raise InputError(

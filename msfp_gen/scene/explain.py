@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from msfp_gen.common.fields import Choice, Quantity, ruled_fields
-from msfp_gen.common.tables import Table, vector, yes
+from msfp_gen.common.tables import Table, vector_text, yes
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Prescribed
 from msfp_gen.scene.bearing import Bearing, Surface
@@ -127,7 +127,7 @@ def body_table(bearing: Bearing) -> Table:
 
 
 def _cells(part: object, columns: dict[str, tuple[str, float]]) -> Iterator[str]:
-    return (vector(np.atleast_1d(getattr(part, name)), scale) for name, scale in columns.values())
+    return (vector_text(np.atleast_1d(getattr(part, name)), scale) for name, scale in columns.values())
 
 
 def motion_table(motion: Motion) -> Table:
@@ -144,9 +144,9 @@ def motion_table(motion: Motion) -> Table:
         (),
         [
             ("duration", f"{motion.duration:.6g} s, {len(motion.knots) - 1} pieces"),
-            ("peak displacement along E1, E2, E3", f"{vector(peaks[0], 1e3)} mm"),
-            ("peak velocity", f"{vector(peaks[1], 1e3)} mm/s"),
-            ("peak acceleration", f"{vector(peaks[2])} m/s^2"),
+            ("peak displacement along E1, E2, E3", f"{vector_text(peaks[0], 1e3)} mm"),
+            ("peak velocity", f"{vector_text(peaks[1], 1e3)} mm/s"),
+            ("peak acceleration", f"{vector_text(peaks[2])} m/s^2"),
             ("rotates", yes(np.any(motion.rotation(t)))),
             *sources,
         ],
@@ -262,5 +262,5 @@ def _value(value: object) -> str:
     if isinstance(value, bool):
         return yes(value)
     if isinstance(value, tuple):
-        return vector(value)
+        return vector_text(value)
     return f"{value:g}" if isinstance(value, float) else str(value)

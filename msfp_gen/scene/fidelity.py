@@ -258,9 +258,10 @@ def _level(scene: Scene, bearing: Bearing) -> Top:
     """The top with a rotational stiffness that holds its plate level."""
     top: Any = scene.top
     lever = JOINT + bearing.bodies[-1].height
-    load = getattr(top, "axial_load", 0.0)
     if isinstance(top, MassTop):
         load, lever = top.mass * bearing.gravity, lever + top.height
+    else:
+        load = top.axial_load
     level_top: Top = replace(top, rotational_stiffness=max(top.rotational_stiffness, LEVEL * load * lever))
     return level_top
 

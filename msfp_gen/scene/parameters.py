@@ -221,7 +221,7 @@ def _parameter(scene: Scene, part: str, field: str, index: tuple[int, ...]) -> P
         value = float(seat_stiffness(scene.bearing, scene.top)[index[0]])
     elif value is None and part == "surfaces":
         value = _law_value(scene, field, index[0])
-    if part == "top" and field.startswith("vertical_") and not getattr(scene.top, "vertical_stiffness", None):
+    if part == "top" and field.startswith("vertical_") and not scene.top.vertical_stiffness:
         raise InputError("this top has no vertical spring, and a run changes abruptly with the first; give it one")
     value = value[component[0]] if component else value
     path += "".join(f"[{i}]" for i in component)

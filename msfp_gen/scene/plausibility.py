@@ -29,7 +29,7 @@ from msfp_gen.specification import contract
 from msfp_gen.specification.layout import Auto, Effects
 
 Doubt = tuple[int, float, str]  # number of the surface, 0: none; the value; the text
-Range = tuple[float, float]
+Interval = tuple[float, float]
 LEAST_DAMPING = 0.01  # ratio of a vibration on vertical springs below which what it adds depends on the tolerance
 USUAL_DAMPING = 0.02  # ratio that is named as the remedy
 RADII = (0.05, 20.0)  # usual, of a surface [m]
@@ -57,7 +57,7 @@ class Reading(NamedTuple):
     words: dict[str, Any] = {}  # noqa: RUF012  # further names in the text; never changed
 
 
-class Check(NamedTuple):
+class UsualRange(NamedTuple):
     """A value, its usual range, and the text of the note outside of it.
 
     read: of a `Subject`, a motion, a target or a building. text: with {index} of surface or body from 0, {value},
@@ -65,9 +65,9 @@ class Check(NamedTuple):
     """
 
     read: Callable[[Any], Iterator[Reading]]
-    usual: Range
+    usual: Interval
     text: str
-    refused: Range = (-inf, inf)
+    refused: Interval = (-inf, inf)
 
 
 def _of_surfaces(name: str, over: str = "") -> Callable[[Subject], Iterator[Reading]]:
@@ -157,7 +157,7 @@ def _limits(name: str, over: Callable[[Subject], float] = lambda _: 1.0) -> Call
     """Reads a limit of the device, and judges it over the capacity of all surfaces together or the load at rest."""
 
     def read(subject: Subject) -> Iterator[Reading]:
-        value, of = getattr(subject.limits, name, None), over(subject)
+        value, of = None if subject.limits is None else getattr(subject.limits, name), over(subject)
         if value is not None and of > 0:
             yield Reading(0, value, value / of, {"of": of})
 
@@ -213,31 +213,31 @@ def _rig(subject: Subject) -> Iterator[Reading]:
 
 _S = "bearing.surfaces[{index}]"
 OF_BEARING = (
-    Check(
+    UsualRange(
         _of_surfaces("friction"),
         (-inf, 0.3),
         _S + ".friction = {value:g} is unusually high; a fraction is meant, not per cent",
     ),
-    Check(
+    UsualRange(
         _of_surfaces("radius"),
         RADII,
         _S + f".radius = {{value:g}} m is outside {RADII[0]:g} to {RADII[1]:g} m; is it in metres?",
         (0.005, 200.0),
     ),
-    Check(
+    UsualRange(
         _tilt,
         (0.002, 0.5),
         _S + ".capacity = {value:g} m tilts the slider by {measure:.2g} rad; is it the displacement along the surface, "
         "in metres?",
         (5e-4, inf),  # above a quarter turn it is an error
     ),
-    Check(
+    UsualRange(
         _of_surfaces("yield_displacement", "capacity"),
         (-inf, 0.1),
         _S + ".yield_displacement = {value:g} m is more than a tenth of the capacity; usual are 0.1 to 1 mm",
         (-inf, 1.0),
     ),
-    Check(
+    UsualRange(
         _rim_stiffness,
         (-inf, 1.0),
         _S
@@ -245,35 +245,35 @@ OF_BEARING = (
         "rim bears less than a third of the load at rest, {load:.4g} N; is it in N/m, not in kN/mm?",
         (-inf, 10.0),
     ),
-    Check(
+    UsualRange(
         _pressure,
         (1.0, 400.0),
         "the load at rest of {value:.4g} N is {measure:.3g} MPa on the smallest face of a slider, {diameter:.4g} mm "
         "wide; are axial_load or mass in N and kg, and the rim_radius of bodies in m?",
         (0.15, 5000.0),
     ),
-    Check(
+    UsualRange(
         _plates,
         (-inf, 0.7),
         "bearing.{path} = {value:g} m is {measure:.2g} of the radius of its surface; is it the height of the plate at "
         "its axis, in metres?",
         (-inf, 10.0),
     ),
-    Check(
+    UsualRange(
         _nested,
         (-inf, 1.25),
         "bearing.bodies[{index}].rim_radius = {value:g} m: at the capacity of surface {s} this slider reaches "
         "{reach:.4g} mm from the axis of the one in which it slides, whose radius is {plate:.4g} mm; are the radii of "
         "the sliders in their order?",
     ),
-    Check(
+    UsualRange(
         _order,
         (-inf, 1.0),
         _S + ".radius = {value:g} m exceeds the radius of the surface outside, surfaces[{outer}].radius = {outside:g} "
         "m; surfaces go from the bottom: are outer and inner ones, or m and p of the layout, exchanged?",
         (-inf, 30.0),
     ),
-    Check(
+    UsualRange(
         _gravity,
         (9.7, 9.9),
         "bearing.gravity = {value:g} m/s^2 is far from 9.81; is it in m/s^2?",
@@ -282,39 +282,39 @@ OF_BEARING = (
 )
 """Checks of a bearing and of its load at rest."""
 OF_RUN = (
-    Check(
+    UsualRange(
         _limits("displacement", _of_capacity),
         (0.05, 1.5),
         "limits.displacement = {value:g} m is {measure:.3g} times the capacity of all surfaces, {of:.3g} m; is it in "
         "metres?",
         (0.001, 50.0),
     ),
-    Check(
+    UsualRange(
         _limits("axial_load", _of_load),
         (0.9, 30.0),
         "limits.axial_load = {value:g} N is {measure:.3g} times the load at rest, {of:.4g} N; is it in N, not in kN?",
         (0.01, 1000.0),
     ),
-    Check(
+    UsualRange(
         _limits("rim_force", _of_load),
         (0.03, 10.0),
         "limits.rim_force = {value:g} N is {measure:.3g} times the load at rest, {of:.4g} N; is it in N, not in kN?",
         (0.003, 300.0),
     ),
-    Check(
+    UsualRange(
         _limits("rim_compression", _of_capacity),
         (-inf, 0.5),
         "limits.rim_compression = {value:g} m is {measure:.3g} times the capacity of all surfaces, {of:.3g} m; is it "
         "in metres?",
         (-inf, 1.0),
     ),
-    Check(
+    UsualRange(
         _limits("uplift_height"),
         (-inf, 0.2),
         "limits.uplift_height = {value:g} m is more than bearings open before they come apart; is it in metres?",
         (-inf, 1.0),
     ),
-    Check(
+    UsualRange(
         _rig,
         (10.0, inf),
         "top.stiffness = {value:g} N/m is {measure:.2g} times the stiffness of the bearing, {own:.3g} N/m, so that the "
@@ -326,33 +326,33 @@ OF_RUN = (
 LEAST_TARGETS = {"pga": 3.0, "sa": 3.0, "sds": 3.0, "ag": 1.0}  # EN 1998-1 maps a_g in m/s^2, often 1 to 3
 BARE = "{path} = {value:g} m/s^2 is {in_g:.3g} g; give the unit, as in '{value:g} g', if it is meant in g"
 OF_MOTION = (
-    Check(
+    UsualRange(
         _peak,
         (0.02, 3.0),
         "motion: the peak acceleration of {value:.3g} m/s^2 is {measure:.3g} g; {remedy}",
         (1e-3, 100.0),
     ),
-    Check(
+    UsualRange(
         _sampling,
         (2e-4, 0.1),
         "motion: the samples are {value:.3g} s apart; are the times of the record in s?",
         (3e-5, 2.0),
     ),
-    Check(
+    UsualRange(
         _scale,
         (0.2, 3.0),
         "motion.scale = {value:.4g} changes the record by more than is usual (0.2 to 3); is the target of the scaling "
         "in m/s^2? '1.5 g' is a text with its unit",
         (-inf, 300.0),
     ),
-    Check(_bare_of_motion, (1.0, inf), BARE),
+    UsualRange(_bare_of_motion, (1.0, inf), BARE),
 )
 """Checks of a motion: of accelerations that were sampled, and of the target of their scaling."""
-OF_TARGET = (Check(_bare, (1.0, inf), BARE),)
+OF_TARGET = (UsualRange(_bare, (1.0, inf), BARE),)
 """Checks of the target of a suite."""
 
 
-def judged(checks: Sequence[Check], subject: Any) -> Iterator[tuple[Doubt, bool]]:
+def judged(checks: Sequence[UsualRange], subject: Any) -> Iterator[tuple[Doubt, bool]]:
     """The doubts about what is outside its usual range, and whether it is refused."""
     for check in checks:
         for reading in check.read(subject):

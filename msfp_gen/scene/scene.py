@@ -11,13 +11,13 @@ from typing import Any, ClassVar, Self
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import check_fields, require_type
-from msfp_gen.common.tables import Printed, Rows
+from msfp_gen.common.tables import LabelledValues, Printed
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.motions.time_grid import TIME_TOLERANCE
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection, load_at_rest, select_effects
-from msfp_gen.scene.effect_switching import all_effects, check
+from msfp_gen.scene.effect_switching import all_effects, check_effects
 from msfp_gen.scene.friction_parameters import bearing_for, check_bearing
 from msfp_gen.scene.planarity import along, scene_plane
 from msfp_gen.scene.scene_fields import InitialState, Limits, SceneFields, Stop
@@ -85,7 +85,7 @@ class Scene(Printed, SceneFields):
         if self.effects.dimension == "planar":
             self._check_plane()
 
-    def printed_rows(self) -> tuple[str, Rows]:
+    def printed_rows(self) -> tuple[str, LabelledValues]:
         """The parts of the scene in six rows at most."""
         layout, motion, effects = self.bearing.layout, self.motion, self.effects
         names = [f"{name} = {value}" for name, value in vars(effects).items() if value is not None]
@@ -130,7 +130,7 @@ class Scene(Printed, SceneFields):
 
     def check_method(self) -> None:
         """Raise InputError where the method does not support the effects at the start of the run."""
-        check(self, self.modelled)
+        check_effects(self, self.modelled)
 
     @property
     def modelled(self) -> Effects:
@@ -159,6 +159,14 @@ class Scene(Printed, SceneFields):
     def with_all_effects(self) -> Self:
         """The scene with every effect that it has parameters for and does not fix; itself where effects are given."""
         return self if isinstance(self.effects, Effects) else replace(self, effects=all_effects(self))
+
+    def with_compared_effects(self) -> Self:
+        """The scene with all effects, with uplift only where it is selected at the start: most methods have none.
+
+        A run in which a surface opens then fails.
+        """
+        complete = self.with_all_effects()
+        return self if complete is self else complete.with_effects(uplift=self.modelled.uplift)
 
     def with_effects_for(self, error: float) -> tuple[Self, str]:
         """The scene with effects selected for half of an error [-], and the reasons; the method has the other half."""
@@ -239,7 +247,7 @@ class Scene(Printed, SceneFields):
                 )
 
     def _check_rotation(self) -> None:
-        stiff = getattr(self.top, "rotational_stiffness", 0.0) or getattr(self.top, "rotational_damping", 0.0)
+        stiff = self.top.rotational_stiffness or self.top.rotational_damping
         if self.top_rotation is not None and not stiff:
             raise InputError(
                 f"top_rotation: it acts through rotational springs, and this {self.top.kind} top has none; give it a "

@@ -17,7 +17,7 @@ import numpy as np
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Quantity, check_fields
 
-Values = dict[str, Any]
+SheetValues = dict[str, Any]
 Face = tuple[float, float, float] | None  # radius of its sphere, of its edge [m], 1 if convex, -1 if concave
 _LENGTHS = Quantity("m", above=0.0, shape=(None,))
 _COEFFICIENTS = Quantity("", least=0.0, shape=(None,))
@@ -176,7 +176,7 @@ class Sheet:
                 )
 
     @property
-    def values(self) -> Values:
+    def values(self) -> SheetValues:
         """The fields of a bearing as plain values; friction is at the pivot, of a single pendulum at its surface."""
         assert self.radius and self.effective_radius and self.height and self.capacity
         m, p = LAYOUTS[self.device]
@@ -210,7 +210,7 @@ class Sheet:
             **{name: list(values) for name, values in frictions.items()},
         }
 
-    def _body(self, index: int, height: float, radii: Sequence[float], m: int) -> Values:
+    def _body(self, index: int, height: float, radii: Sequence[float], m: int) -> SheetValues:
         """Values of a body (index from 0, the base first): of revolution, between its two faces."""
         lower, upper = self._face(index - 1, index, radii, m), self._face(index, index, radii, m)
         mass, centroid, moments = revolved(height, lower, upper, self.density)

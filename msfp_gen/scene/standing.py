@@ -97,7 +97,7 @@ def standing_of(scene: SceneFields) -> tuple[str, float, float, float] | None:
         return None
     load -= 0.0 if scene.load is None else float(scene.load.evaluate(0.0)[2])
     mass, height = (top.mass, top.height) if isinstance(top, MassTop) else (0.0, 0.0)
-    needed = needed_rotational_stiffness(scene.bearing, load, getattr(top, "stiffness", 0.0), mass, height)
+    needed = needed_rotational_stiffness(scene.bearing, load, top.stiffness, mass, height)
     return "top.rotational_stiffness", top.rotational_stiffness, needed, load + mass * scene.bearing.gravity
 
 
@@ -136,7 +136,7 @@ def stiffness_slopes(bearing: Bearing, top: Top, spring: str) -> Array:
 
 def _stiffest_spring(bearing: Bearing, top: Top | None) -> tuple[str, float, float]:
     """Name and stiffness of the stiffest spring of the top, and what every contact needs to have `SHARE` [N/m]."""
-    springs = {name: getattr(top, name, None) or 0.0 for name in SPRINGS}
+    springs = {name: 0.0 if top is None else getattr(top, name) or 0.0 for name in SPRINGS}
     name = max(springs, key=lambda spring: springs[spring])
     return name, springs[name], len(bearing.surfaces) * springs[name] / SHARE
 

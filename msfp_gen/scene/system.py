@@ -20,7 +20,7 @@ from msfp_gen.common.errors import InputError
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.scene.scene_fields import Limits
+    from msfp_gen.scene.scene_fields import Limits, Stop
     from msfp_gen.scene.solver import Solver
     from msfp_gen.specification.friction_laws import Law
     from msfp_gen.specification.layout import Effects, ModelSpec
@@ -53,6 +53,10 @@ class System(Protocol):
     @property
     def solver(self) -> Solver:
         """Method and tolerances."""
+
+    @property
+    def stop(self) -> Stop | None:
+        """Condition that ends a run before its end; None: it has none. Where there is one, it is a field."""
 
     @property
     def limits(self) -> Limits | None:
@@ -93,6 +97,9 @@ class System(Protocol):
 
     def with_all_effects(self) -> Self:
         """It with every effect that it has parameters for and does not fix."""
+
+    def with_compared_effects(self) -> Self:
+        """It with effects that no run changes on its way, for the methods whose errors are compared."""
 
     def with_effects_for(self, error: float) -> tuple[Self, str]:
         """It with effects for a run with a relative error [-], and the reasons as text; given effects are kept."""
@@ -136,6 +143,7 @@ class OtherSystem(ABC):
     rows_between_steps: ClassVar[bool] = False
     energy_compared: ClassVar[tuple[str, str]] = ENERGY_COMPARED
     longest_row_step: ClassVar[tuple[float, str]] = (math.inf, "")  # rows of other systems are few
+    stop: ClassVar[None] = None
     own_motions: Any = ()  # a property of buildings
     name: Any
 
@@ -204,6 +212,10 @@ class OtherSystem(ABC):
         """It with every effect that it has parameters for and does not fix."""
         return self
 
+    def with_compared_effects(self) -> Any:
+        """It with effects that no run changes on its way: with all effects."""
+        return self.with_all_effects()
+
     def with_effects_for(self, error: float) -> tuple[Any, str]:
         """It with effects for a run with a relative error [-], and the reasons as text."""
         return self, "effects as they are selected for every bearing"
@@ -250,6 +262,12 @@ class Kind:
 def is_system(value: object) -> bool:
     """Whether a value can be run."""
     return hasattr(type(value), "run_options")
+
+
+def require_field(system: Any, name: str, without: str) -> None:
+    """Raise InputError for a system without a field. without: what follows, or the remedy."""
+    if name not in system.__dataclass_fields__:
+        raise InputError(f"{system.name}: this system has no field {name}; {without}")
 
 
 @cache

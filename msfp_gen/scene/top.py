@@ -26,6 +26,12 @@ class Top:
     """
 
     kind: ClassVar[str] = ""
+    # Springs that a kind of top does not have; a kind that has one has a field of this name. Without field(), such a
+    # field would take the inherited value, and `mass` the static method, as its default.
+    stiffness = 0.0
+    rotational_stiffness = 0.0
+    rotational_damping = 0.0
+    vertical_stiffness = 0.0
 
     def __post_init__(self) -> None:
         if not self.kind:
@@ -93,7 +99,7 @@ class RigTop(Top):
 
     kind: ClassVar[str] = "rig"
     axial_load: Annotated[float, contract.AXIAL_LOAD.rule]
-    stiffness: Annotated[float, _TOP["stiffness"]]
+    stiffness: Annotated[float, _TOP["stiffness"]] = field()
     damping: Annotated[float, _TOP["damping"]] = 0.0
     rotational_stiffness: Annotated[float, _TOP["rotational_stiffness"]] = 0.0
     rotational_damping: Annotated[float, _TOP["rotational_damping"]] = 0.0
@@ -123,13 +129,12 @@ class MassTop(Top):
     """
 
     kind: ClassVar[str] = "mass"
-    # Without field(), the inherited static method Top.mass would be taken as the default value.
     mass: Annotated[float, _MASS["mass"]] = field()  # type: ignore[assignment]
     inertia: Annotated[tuple[float, float] | float, paired(_MASS["inertia_transverse"])]
     height: Annotated[float, _MASS["height"]]
     rotational_stiffness: Annotated[float, _MASS["rotational_stiffness"]] = 0.0
     rotational_damping: Annotated[float, _MASS["rotational_damping"]] = 0.0
-    vertical_stiffness: Annotated[float | None, _MASS["vertical_stiffness"]] = None
+    vertical_stiffness: Annotated[float | None, _MASS["vertical_stiffness"]] = None  # type: ignore[assignment]
     vertical_damping: Annotated[float, _MASS["vertical_damping"]] = 0.0
 
     def __post_init__(self) -> None:
@@ -153,9 +158,9 @@ class NodeTop(Top):
     """
 
     kind: ClassVar[str] = "node"
-    stiffness: Annotated[float, _INTERFACE["stiffness"]]
-    vertical_stiffness: Annotated[float, _INTERFACE["vertical_stiffness"]]
-    rotational_stiffness: Annotated[float, _INTERFACE["rotational_stiffness"]]
+    stiffness: Annotated[float, _INTERFACE["stiffness"]] = field()
+    vertical_stiffness: Annotated[float, _INTERFACE["vertical_stiffness"]] = field()
+    rotational_stiffness: Annotated[float, _INTERFACE["rotational_stiffness"]] = field()
     damping: Annotated[float, _INTERFACE["damping"]] = 0.0
     vertical_damping: Annotated[float, _INTERFACE["vertical_damping"]] = 0.0
     rotational_damping: Annotated[float, _INTERFACE["rotational_damping"]] = 0.0

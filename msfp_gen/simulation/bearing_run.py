@@ -10,13 +10,13 @@ from typing import Any
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import RunError
-from msfp_gen.model.compiled import Run
+from msfp_gen.model.compiled import CompiledBearingRun
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.results.history import BearingRows, Counters
 from msfp_gen.results.joining import joined
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.results.result import Result
-from msfp_gen.scene.effect_switching import check, next_effects, stopping_monitors
+from msfp_gen.scene.effect_switching import check_effects, next_effects, stopping_monitors
 from msfp_gen.scene.parameters import Parameter
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import is_sprung
@@ -31,20 +31,20 @@ from msfp_gen.simulation.gradients import (
 )
 from msfp_gen.simulation.memory import outgrown, require_memory
 from msfp_gen.simulation.outcome import extremes_of, history_notes, landing_notes, message_of, provenance_of
-from msfp_gen.simulation.rows import Segment, events_of, finite_rows, history_of, start_temperatures
+from msfp_gen.simulation.rows import Segment, events_of, finite_rows, history_of, temperature_row
 from msfp_gen.simulation.start import (
     RestartState,
     moves_settling,
     needs_settling,
     settling_scene,
-    start_run,
+    start_compiled_run,
     start_slopes,
     state_at_rest,
 )
 from msfp_gen.simulation.system import finish
 from msfp_gen.specification.layout import Effects
 
-Parts = list[tuple[Model, Array, float]]  # of segments with rows: model, rows and azimuth of its frame
+SegmentParts = list[tuple[Model, Array, float]]  # of segments with rows: model, rows and azimuth of its frame
 STEPS_PER_CALL = 4000  # of the compiled run, without the GIL; Ctrl-C, progress and checkpoints are handled in between
 
 
@@ -116,21 +116,21 @@ class BearingRun:
 
     def begin(self) -> None:
         """Build the next model and make its compiled run."""
-        check(self.settled, self.effects)
+        check_effects(self.settled, self.effects)
         begin = time.perf_counter()
         self._model = build_model(self.scene.bearing.layout, self.effects, gradients=bool(self.parameters))
         self._run, self._azimuth = self.start_segment(self._model)
         self._earlier = sum(segment.run.row_count for segment in self.segments)
         self._setup = time.perf_counter() - begin
 
-    def start_segment(self, model: Model) -> tuple[Run, float]:
+    def start_segment(self, model: Model) -> tuple[CompiledBearingRun, float]:
         """The compiled run of the next segment before its first step, and the azimuth of its frame [rad]."""
         scene, selection = self.settled, self.settled.effect_selection
         last = [segment for segment in self.segments if segment.run.row_count][-1:]  # one that failed at once has none
         at = RestartState.of(last[0].model, last[0].run, last[0].azimuth) if last else None
         end = min(scene.end, selection.plane_until) if model.effects.dimension == "planar" else scene.end
         stops = stopping_monitors(scene, model.effects, self.strict)
-        run, azimuth = start_run(scene, model, selection, end, at, stops)
+        run, azimuth = start_compiled_run(scene, model, selection, end, at, stops)
         if self.parameters:
             start_gradients(run, scene, model, self.parameters, energies=self.energies, start=self.slopes)
         return run, azimuth
@@ -209,7 +209,7 @@ def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, t
     return replace(scene, initial_state=state), start_slopes(history, end.gradients, parameters)
 
 
-def _result(run: BearingRun, parts: Parts) -> Result:
+def _result(run: BearingRun, parts: SegmentParts) -> Result:
     scene, segments, parameters, last = run.scene, run.segments, run.parameters, run.segments[-1]
     effects, counts = last.model.effects, [segment.run.counts for segment in segments]
     events = tuple(event for s in segments for event in events_of(s.run, s.azimuth))
@@ -233,9 +233,9 @@ def _result(run: BearingRun, parts: Parts) -> Result:
     )
 
 
-def _history(parts: Parts, scene: Scene, _: Result) -> BearingRows:
+def _history(parts: SegmentParts, scene: Scene, _: Result) -> BearingRows:
     """The history of a result."""
-    before = start_temperatures(parts[-1][0].effects.law, scene)
+    before = temperature_row(parts[-1][0].effects.law, scene)
     histories = [history_of(model, rows, azimuth, is_sprung(scene.top)) for model, rows, azimuth in parts]
     return joined(histories, scene.output_step, before)
 

@@ -124,9 +124,9 @@ class Checkpoint:
             return
         start = time.monotonic()
         try:
-            write(self.path, self._identity, [*self._earlier, self._saved(run)])
+            write_checkpoint(self.path, self._identity, [*self._earlier, self._saved(run)])
         except (OSError, MemoryError) as error:
-            reason = getattr(error, "strerror", None) or str(error) or "no memory"
+            reason = (error.strerror if isinstance(error, OSError) else "") or str(error) or "no memory"
             warnings.warn(f"checkpoint {self.path} not written ({reason}); the run continues", RuntimeWarning, 2)
         now = time.monotonic()
         self._due = now + max(self._every, WRITE_INTERVAL * (now - start))
@@ -136,7 +136,7 @@ class Checkpoint:
 
     def _load(self) -> list[Saved]:
         try:
-            identity, segments = read(self.path)
+            identity, segments = read_checkpoint(self.path)
         except OSError as error:
             raise self._refused(f"cannot be read ({error.strerror or error})") from None
         except ValueError:
@@ -150,7 +150,7 @@ class Checkpoint:
         return InputError(f"checkpoint = {str(self.path)!r}: {reason}; {remedy}")
 
 
-def write(path: Path, identity: Identity, segments: list[Saved]) -> None:
+def write_checkpoint(path: Path, identity: Identity, segments: list[Saved]) -> None:
     """Write a checkpoint file, completely or not at all."""
     about = [[each.build, each.time, each.wall, len(each.snapshot)] for each in segments]
     header = json.dumps(asdict(identity) | {"segments": about}).encode() + b"\n"
@@ -161,7 +161,7 @@ def write(path: Path, identity: Identity, segments: list[Saved]) -> None:
     write_bytes(path, (MAGIC, digest.hexdigest().encode(), b"\n", *parts))
 
 
-def read(path: Path) -> tuple[Identity, list[Saved]]:
+def read_checkpoint(path: Path) -> tuple[Identity, list[Saved]]:
     """Identity and segments in a checkpoint file. Raises ValueError where it is incomplete or altered, and OSError."""
     from msfp_gen.scene.file.loader import toml_table
 

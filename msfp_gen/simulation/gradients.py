@@ -14,7 +14,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
-from msfp_gen.model.compiled import Run
+from msfp_gen.model.compiled import CompiledBearingRun
 from msfp_gen.model.model import Model
 from msfp_gen.model.plane import motion_in_plane, out_of_plane, wrench_in_plane
 from msfp_gen.motions.motion import Motion
@@ -50,7 +50,7 @@ _BASE_FIELDS = {"base_height": "height", "base_rim_radius": "rim_radius", "base_
 
 
 def start_gradients(
-    run: Run,
+    run: CompiledBearingRun,
     scene: Scene,
     model: Model,
     parameters: Sequence[Parameter],

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 
 from msfp_gen.common.errors import InputError
-from msfp_gen.results.history import ENERGY, LABELS, STACK, quantities
+from msfp_gen.results.history import ENERGY, LABELS, STACK, row_fields
 from msfp_gen.scene.system import System
 
 VARIABLE = "MSFP_GEN_MEMORY"  # environment variable: memory that this process may use [GB]
@@ -57,7 +57,7 @@ def outgrown(rows: int, surfaces: int) -> bool:
 def row_size(surfaces: int) -> int:
     """Size of one row of a result [bytes]."""
     sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}
-    numbers = sum(math.prod(sizes[dim] for dim in rows.dims) for rows in quantities().values()) + len(ENERGY)
+    numbers = sum(math.prod(sizes[dim] for dim in rows.dims) for rows in row_fields().values()) + len(ENERGY)
     return 8 * numbers
 
 
@@ -80,7 +80,7 @@ def _of_machine() -> float:
     for line in _text(_PROC / "meminfo").splitlines():
         if line.startswith("MemAvailable:"):
             return 1024.0 * float(line.split()[1])
-    with suppress(AttributeError, ValueError, OSError):  # another system: all of its memory
+    with suppress(AttributeError, ValueError, OSError):  # another operating system: all of its memory
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     return math.inf
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.version import __version__
-from msfp_gen.model.compiled import Run
+from msfp_gen.model.compiled import CompiledBearingRun
 from msfp_gen.model.model import Model
 from msfp_gen.results.history import Event, Extremes, History
 from msfp_gen.results.note import Note, monitor_notes
@@ -94,7 +94,7 @@ def stopped(time: float, end: float, status: str, surface: int, value: float, ca
     return f"stopped at t = {time:.6g} s of {end:.6g} s{where}: {cause or known.failure}"
 
 
-def _pulled(scene: Scene, run: Run) -> bool:
+def _pulled(scene: Scene, run: CompiledBearingRun) -> bool:
     """Whether a run failed at once from a displaced state under a rig, whose springs are anchored above the base."""
     state, top = scene.initial_state, scene.top
     anchored = isinstance(top, RigTop) and top.stiffness > 0
@@ -103,7 +103,7 @@ def _pulled(scene: Scene, run: Run) -> bool:
 
 def _flipped(scene: Scene, status: str) -> bool:
     """Whether the stack came apart below a plate that may turn freely once no surface carries."""
-    return status == "separated" and not getattr(scene.top, "rotational_stiffness", 0.0)
+    return status == "separated" and not scene.top.rotational_stiffness
 
 
 def _inertia_missing(scene: Scene, model: Model, status: str) -> bool:
@@ -112,7 +112,7 @@ def _inertia_missing(scene: Scene, model: Model, status: str) -> bool:
     return massless and (status in JAM_STATUSES or (carried and status == "uplift"))
 
 
-def _state(scene: Scene, model: Model, run: Run) -> str:
+def _state(scene: Scene, model: Model, run: CompiledBearingRun) -> str:
     """Summary of the last row, with a remedy where the top plate has overturned."""
     row = model.unpack(run.rows[-1])
     angles = row["q"][:, :2]
@@ -217,7 +217,7 @@ def tolerance_notes(scene: Scene, effects: Effects, history: History) -> tuple[N
     if scene.load is None or not filtered or not scene.load.coefficients[:, :2].any():
         return ()
     radius = max(surface.radius for surface in scene.bearing.surfaces)
-    force = getattr(scene.top, "stiffness", 0.0) * scene.solver.angle_tolerance * radius
+    force = scene.top.stiffness * scene.solver.angle_tolerance * radius
     across = np.hypot(history.top_force[:, 0], history.top_force[:, 1])
     row = int(across.argmax())
     if not force > TOLERANCE_LIMIT * across[row] > 0:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.model.compiled import Run
+from msfp_gen.model.compiled import CompiledBearingRun
 from msfp_gen.model.model import Model
 from msfp_gen.model.plane import out_of_plane
 from msfp_gen.results.history import Event, History
@@ -90,7 +90,7 @@ def unpacked(model: Model, rows: Array, azimuth: float, sprung: bool) -> dict[st
     }
 
 
-def events_of(run: Run, azimuth: float) -> tuple[Event, ...]:
+def events_of(run: CompiledBearingRun, azimuth: float) -> tuple[Event, ...]:
     """The events of a segment in the frame of the user."""
     return tuple(
         Event(
@@ -113,7 +113,7 @@ class Segment:
     """
 
     model: Model
-    run: Run
+    run: CompiledBearingRun
     azimuth: float
     status: str
     wall: float
@@ -126,7 +126,7 @@ class Segment:
         return Ending(self.model.effects, self.status, self.run.time, surface, value, self.run.trips)
 
 
-def start_temperatures(law: Law | None, scene: Scene) -> dict[str, Array]:
+def temperature_row(law: Law | None, scene: Scene) -> dict[str, Array]:
     """The temperature of every surface at the start as "temperature", shape (n-1,) [degC]; nothing without one.
 
     Rows of earlier models without heat have it, and the friction law in them. law: of the last model.

@@ -15,7 +15,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError
 from msfp_gen.common.later import kept
-from msfp_gen.model.compiled import Port, Run, bodies_and_surfaces, separations_at_rest, top_values
+from msfp_gen.model.compiled import CompiledBearingRun, Port, bodies_and_surfaces, separations_at_rest, top_values
 from msfp_gen.model.model import Model, stack_values
 from msfp_gen.model.plane import (
     motion_in_plane,
@@ -75,7 +75,7 @@ class RestartState:
     memory: Array | None = None
 
     @classmethod
-    def of(cls, model: Model, run: Run, azimuth: float) -> RestartState:
+    def of(cls, model: Model, run: CompiledBearingRun, azimuth: float) -> RestartState:
         """The current state of `run`; a row of it is recorded."""
         run.record_now()
         return cls(azimuth=azimuth, planar=model.planar, **model.extension.read_state(run.snapshot(rows=1)))
@@ -185,9 +185,9 @@ class RunArguments(NamedTuple):
     options: dict[str, Any]
 
 
-def start_run(
+def start_compiled_run(
     scene: Scene, model: Model, selection: EffectSelection, end: float, at: RestartState | None, stops: tuple[str, ...]
-) -> tuple[Run, float]:
+) -> tuple[CompiledBearingRun, float]:
     """A compiled run before its first step, and the azimuth of its frame [rad].
 
     end: time at which the run ends [s]. at: state of the segment before; None: the initial state of the scene. stops:
@@ -208,7 +208,9 @@ def start_run(
         if (memory := at.memory_of(model.effects.law)) is not None:
             options["memory"] = memory
     given = run_arguments(scene, model.spec, frame, state, end)
-    run: Run = model.extension.Run(model.extension.Stack(*given.stack), *given.arrays, **given.options | options)
+    run: CompiledBearingRun = model.extension.Run(
+        model.extension.Stack(*given.stack), *given.arrays, **given.options | options
+    )
     return run, frame.azimuth
 
 
@@ -223,7 +225,7 @@ def first_arguments(scene: Scene, spec: ModelSpec) -> tuple[RunArguments, float]
 def run_arguments(
     scene: Scene, spec: ModelSpec, frame: Frame, state: tuple[Array, Array, Array], end: float
 ) -> RunArguments:
-    """The arguments of a compiled run from a state, without monitors. end: see `start_run`."""
+    """The arguments of a compiled run from a state, without monitors. end: see `start_compiled_run`."""
     solver, stop, grid = scene.solver, scene.stop, time_grid(scene)
     arrays = (
         *kept(frame.motion, _snapped, grid),

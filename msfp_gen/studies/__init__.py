@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from msfp_gen.studies.estimation.estimate import estimate as estimate
     from msfp_gen.studies.estimation.estimate import plot_estimate as plot_estimate
     from msfp_gen.studies.run import Outcome as Outcome
-    from msfp_gen.studies.run import Status as Status
+    from msfp_gen.studies.run import StudyStatus as StudyStatus
     from msfp_gen.studies.run import study_status as study_status
 
 # Public name -> the module that defines it.
@@ -37,7 +37,7 @@ _MODULES = {
     "plot_fragility": "assessment.fragility",
     "plot_ida": "assessment.ida",
     "plot_tornado": "assessment.sensitivity",
-    "Status": "run",
+    "StudyStatus": "run",
     "load_study": "definition",
     "study_status": "run",
 }

@@ -22,7 +22,7 @@ from msfp_gen.common.errors import InputError, prefixed
 from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.file.catalogue import parsed, suggestion
-from msfp_gen.scene.file.changes import changed_table, keys_of, multiplied_table
+from msfp_gen.scene.file.changes import changed_table, keys_of_path, multiplied_table
 from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.scene.file.source import located_value, scene_of
 from msfp_gen.scene.scene_fields import SceneFields
@@ -410,16 +410,15 @@ class SceneFactory:
         at_fidelity(self.base, self._fidelity)  # raises its errors
         self._check_motions(self.base)
         self._set_paths = sorted(  # (depth, index of the axis, path): a table is set before its fields
-            (len(keys_of(path)), index, path)
+            (len(keys_of_path(path)), index, path)
             for index, axis in enumerate(inputs.axes)
             for path in axis.paths
             if axis.change == "sets"
         )
         self._table = base
-        shared = {field.name for field in fields(SceneFields)}  # the tables of other kinds are read with every scene
-        self._parts = {
-            field.name: getattr(self.base, field.name) for field in fields(self.base) if field.name in shared
-        }
+        # Runs share the parts of the base scene; the tables that only other kinds have are read with every scene.
+        shared = {field.name for field in fields(SceneFields)} & {field.name for field in fields(self.base)}
+        self._parts = {name: getattr(self.base, name) for name in shared}
 
     def scene(self, values: Sequence[Any]) -> System:
         """The scene of a run. values: one for each axis, in the order of the axes. Raises InputError."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from typing import Any
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.model.model import build_model, working_time
@@ -14,7 +15,6 @@ from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.simulate import integrate
 from msfp_gen.studies.workers import SharedProgress, local_pool, proceed, worker_count
 
-Proceed = Callable[[float, float], None]  # (simulated time, end), or (share done, 1)
 ENDED = ("ok", "stopped")  # statuses of runs that did not fail
 BAD_INPUT, OUT_OF_TIME = "input", "limit"  # statuses that only runs of studies have
 
@@ -69,7 +69,7 @@ def completed_runs(
     *,
     strict: bool = False,
     labels: Sequence[str] | None = None,
-    progress: Proceed | None = None,
+    progress: Progress | None = None,
 ) -> Generator[tuple[int, Any], None, None]:
     """Run scenes at the same time; yields (index, result) in the order in which the runs end.
 

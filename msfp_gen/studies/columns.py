@@ -20,7 +20,7 @@ import numpy as np
 
 from msfp_gen.common.errors import InputError
 from msfp_gen.results.files import Storage
-from msfp_gen.results.quantities import Side, Source
+from msfp_gen.results.quantities import ColumnSource, Side
 from msfp_gen.results.variables import Arrays, Places
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.specification import formula
@@ -46,12 +46,12 @@ _LEFT_OUT = ("status", "message")  # every row has them
 _OPERATIONS = {**formula.FLOAT_OPERATIONS, "power": math.pow}
 
 
-def usual_names(sources: Mapping[str, Source]) -> tuple[str, ...]:
+def usual_names(sources: Mapping[str, ColumnSource]) -> tuple[str, ...]:
     """Names of the quantities that a study keeps where its file names none."""
     return names_of({name: source for name, source in sources.items() if source.quantity.kept})
 
 
-def names_of(sources: Mapping[str, Source]) -> tuple[str, ...]:
+def names_of(sources: Mapping[str, ColumnSource]) -> tuple[str, ...]:
     """Names, without the numbers of surfaces or parts, that keep all columns of `sources`."""
     kept = [name if source.place is None else name.rpartition("_")[0] for name, source in sources.items()]
     return tuple(dict.fromkeys(kept))
@@ -129,11 +129,11 @@ class Keep:
     names: tuple[str, ...]
     formulas: tuple[tuple[str, str], ...]
     axes: tuple[str, ...]
-    sources: tuple[tuple[str, Source], ...] = ()
+    sources: tuple[tuple[str, ColumnSource], ...] = ()
     history: tuple[str, ...] = ()
 
     @cached_property
-    def known(self) -> dict[str, Source]:
+    def known(self) -> dict[str, ColumnSource]:
         """Column -> where its value comes from, for all columns that a study can keep."""
         return {name: source for name, source in self.sources if name not in _LEFT_OUT}
 

@@ -24,7 +24,7 @@ from msfp_gen.common.fields import Choice, Quantity, check_fields, ruled_fields
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Files, expecting, is_input, recording
 from msfp_gen.results.dataset import columns as columns_of_system
-from msfp_gen.results.quantities import Source, quantities
+from msfp_gen.results.quantities import ColumnSource, quantities
 from msfp_gen.scene.file.catalogue import check_whole_numbers, known_keys, parsed
 from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.scene.file.loader import Suite, load_suite, scene_table, suite_from_table, toml_file
@@ -247,7 +247,7 @@ def check_study(study: Study) -> Study:
         for axis in study.axes:
             with prefixed(f"axes.{axis.name}."):
                 _check_axis(axis, factory, bool(study.inputs.records))
-        sources: dict[str, Source] = {}
+        sources: dict[str, ColumnSource] = {}
         columns: dict[str, None] = {}
         first, base, opened = {}, "", {}
         for place, scene, files in _tried_scenes(study, factory):  # one scene in memory at a time: motions are long

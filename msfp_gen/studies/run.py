@@ -414,7 +414,7 @@ def study_table(folder: Path) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Status:
+class StudyStatus:
     """How far a study has come.
 
     Attributes:
@@ -442,7 +442,7 @@ class Status:
         return asdict(self)
 
 
-def study_status(folder: str | Path) -> Status:
+def study_status(folder: str | Path) -> StudyStatus:
     """How far the study in a folder has come. Raises InputError where the folder has no study."""
     folder = Path(folder)
     table = study_table(folder)
@@ -451,7 +451,7 @@ def study_status(folder: str | Path) -> Status:
     written = {name: min(chunk, runs - number * chunk) for name, number in parts.items()}
     done = sum(written.values())
     rate, running = _rate(folder, written)
-    return Status(
+    return StudyStatus(
         name=str(table.get("name", "")),
         runs=runs,
         done=done,
@@ -487,7 +487,7 @@ def failures(part: Path) -> int:
         return int((pq.read_schema(part).metadata or {})[b"failed"])
 
 
-def status_table(status: Status) -> Table:
+def status_table(status: StudyStatus) -> Table:
     """The status of a study as a table for a terminal."""
     rows = [
         ("runs", f"{status.done} of {status.runs} done ({100 * status.done / status.runs:.1f} %)"),

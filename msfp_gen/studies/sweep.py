@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.common.errors import InputError, RunError, prefixed
 from msfp_gen.common.tables import Table, write_columns
-from msfp_gen.results.quantities import Source, quantities, value_at
-from msfp_gen.scene.file.changes import keys_of
+from msfp_gen.results.quantities import ColumnSource, quantities, value_at
+from msfp_gen.scene.file.changes import keys_of_path
 from msfp_gen.scene.file.loader import scene_table
 from msfp_gen.scene.file.source import with_absolute_paths
 from msfp_gen.scene.system import System
@@ -45,7 +45,7 @@ def varied_field(text: str) -> tuple[str, list[Any]]:
     path, equals, values = text.partition("=")
     path = path.strip()
     try:
-        keys = keys_of(path) if equals else []
+        keys = keys_of_path(path) if equals else []
     except InputError:
         keys = []
     if not keys:
@@ -131,7 +131,7 @@ def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> 
         ("scene", ""): [row.variation.source for row in rows],
         **{(path, ""): [plain_cell(row.variation.varied.get(path)) for row in rows] for path in varied},
     }
-    sources: dict[str, Source] = {}
+    sources: dict[str, ColumnSource] = {}
     for row in rows:
         sources = quantities(row.variation.scene) | sources
     for column, source in sources.items():

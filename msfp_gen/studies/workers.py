@@ -27,6 +27,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any, TypeVar
 
+from msfp_gen.common.aliases import Progress
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.errors import InputError, MsfpError, RunError
 
@@ -42,8 +43,16 @@ WORTH = 1.15  # slowness of threads from which processes are tried: a trial of s
 LARGE = 2**20  # arrays of this size [bytes] come from a process in a file in memory: a pipe copies them six times
 MEMORY = Path("/dev/shm")  # files here are memory, on Linux
 
-Report = Callable[[float, float], None]  # (reached, end)
-_worker = threading.local()  # attributes `stop`: the flag that ends the runs of this thread; `report`: of its call
+
+class _Worker(threading.local):
+    """What the present thread has: a flag that ends its runs, the report of its call, and when its last call ended."""
+
+    stop: threading.Event | None = None
+    report: Progress | None = None
+    ended = 0.0
+
+
+_worker = _Worker()
 
 
 class _StoppedError(Exception):
@@ -56,12 +65,10 @@ class _UnsuitedError(Exception):
 
 def proceed(reached: float, end: float) -> None:
     """The `progress` callback of a run in a worker: reports, and ends the run once its pool has ended."""
-    stop: threading.Event | None = getattr(_worker, "stop", None)
-    if stop is not None and stop.is_set():
+    if _worker.stop is not None and _worker.stop.is_set():
         raise _StoppedError
-    report: Report | None = getattr(_worker, "report", None)
-    if report is not None:
-        report(reached, end)
+    if _worker.report is not None:
+        _worker.report(reached, end)
 
 
 @dataclass(frozen=True)
@@ -76,7 +83,7 @@ class Pool:
         self,
         function: Callable[..., T],
         calls: Iterable[tuple[S, tuple[Any, ...]]],
-        report: Callable[[S], Report] | None = None,
+        report: Callable[[S], Progress] | None = None,
     ) -> Iterator[tuple[S, T]]:
         """Call `function` on the workers; yields the key of each call and the returned value, in order of completion.
 
@@ -261,7 +268,7 @@ class Workers(Executor):
         self.ways, self._suited = ways, self._count > 1
 
     def submit(  # type: ignore[override]
-        self, function: Callable[..., T], /, *arguments: Any, report: Report | None = None
+        self, function: Callable[..., T], /, *arguments: Any, report: Progress | None = None
     ) -> Future[T]:
         """See `Executor`. report: called with the progress of the call; from a process only when it has ended."""
         with self._lock:
@@ -285,10 +292,10 @@ class Workers(Executor):
     def _begin_thread(self) -> None:
         _worker.stop = self._stop
 
-    def _call(self, function: Callable[..., T], arguments: tuple[Any, ...], report: Report | None) -> T:
+    def _call(self, function: Callable[..., T], arguments: tuple[Any, ...], report: Progress | None) -> T:
         """The value of a call, in this thread or in a process."""
         # The wait for the global lock, of this thread and of the thread that submits, begins with the last call's end.
-        begin = max(self._began, getattr(_worker, "ended", 0.0))
+        begin = max(self._began, _worker.ended)
         try:
             return self._run(function, arguments, report, begin)
         finally:
@@ -298,7 +305,7 @@ class Workers(Executor):
         with self._lock:
             self._under_way -= 1
 
-    def _run(self, function: Callable[..., T], arguments: tuple[Any, ...], report: Report | None, begin: float) -> T:
+    def _run(self, function: Callable[..., T], arguments: tuple[Any, ...], report: Progress | None, begin: float) -> T:
         """The same. begin: since when this thread was free [s]."""
         ways = self.ways
         if self.in_process(ways):
@@ -457,12 +464,12 @@ class SharedProgress:
     the calls.
     """
 
-    def __init__(self, calls: int, report: Report) -> None:
+    def __init__(self, calls: int, report: Progress) -> None:
         self._shares = [0.0] * calls
         self._report = report
         self._lock = threading.Lock()
 
-    def of(self, call: int) -> Report:
+    def of(self, call: int) -> Progress:
         """What is told of a call by its index."""
 
         def update(reached: float, end: float) -> None:

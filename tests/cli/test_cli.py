@@ -13,7 +13,7 @@ import pytest
 from support.synthetic import loops, ramp
 
 from msfp_gen.cli import main
-from msfp_gen.cli.console import Progress
+from msfp_gen.cli.console import ShownProgress
 from msfp_gen.cli.run_commands import DEMO
 from msfp_gen.common.errors import CompileError, RunError
 from msfp_gen.common.tables import Table
@@ -295,9 +295,9 @@ def test_presets_are_listed(capsys):
 
 
 def test_doctor_fails_when_something_is_missing(capsys, monkeypatch):
-    from msfp_gen.jit.doctor import Check
+    from msfp_gen.jit.doctor import CheckResult
 
-    checks = [Check("python", True, "3.11"), Check("C compiler", False, "none", "install gcc")]
+    checks = [CheckResult("python", True, "3.11"), CheckResult("C compiler", False, "none", "install gcc")]
     monkeypatch.setattr("msfp_gen.jit.doctor.diagnose", lambda: checks)
     assert main(["doctor"]) == 1
     out = capsys.readouterr().out
@@ -344,7 +344,7 @@ def test_terminal_gets_rich_tables_and_progress(capsys, monkeypatch, simulated):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     assert main(["run", "fenz-test5"]) == 0
-    with Progress("fenz-test5") as update:
+    with ShownProgress("fenz-test5") as update:
         for time in (0.0, 20.0, 20.1, 40.0):
             update(time, 40.0)
     out, err = capsys.readouterr()
@@ -354,7 +354,7 @@ def test_terminal_gets_rich_tables_and_progress(capsys, monkeypatch, simulated):
 
 def test_progress_never_falls_and_is_lines_where_there_is_no_terminal(capsys, monkeypatch):
     monkeypatch.setattr("msfp_gen.cli.console.EVERY", 0.02)
-    with Progress("33 runs") as update:
+    with ShownProgress("33 runs") as update:
         time.sleep(0.06)  # nothing is known yet
         update(20, 40)
         update(10, 40)

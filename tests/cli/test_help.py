@@ -14,7 +14,7 @@ from support.synthetic import loops
 
 from msfp_gen import load_scene
 from msfp_gen.cli import app, main
-from msfp_gen.cli.console import Progress, building, scenes
+from msfp_gen.cli.console import ShownProgress, building, scenes
 from msfp_gen.motions.records import ScaleTo, baseline_corrected, bundled, response_spectrum
 from msfp_gen.report import report_html
 
@@ -82,7 +82,7 @@ def test_progress_says_how_long_it_still_takes(capsys, monkeypatch):
     now = [0.0]
     monkeypatch.setattr("msfp_gen.cli.console.monotonic", lambda: now[0])
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    with Progress("long") as update:
+    with ShownProgress("long") as update:
         for now[0], done in ((0.5, 1.0), (4.0, 2.5)):
             update(done, 10.0)
     err = capsys.readouterr().err

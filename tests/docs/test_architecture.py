@@ -50,6 +50,22 @@ KIND_SWITCHES = {
     "cli.console.is_result": "the source of a command is a result or a scene",
     "auditing.momentum.momentum": "the position of a mass, in a table of any program",
 }
+# Functions outside `buildings` that ask whether a value has an attribute, each with its reason.
+ATTRIBUTE_SWITCHES = {
+    "scene.system.is_system": "states what a system is",
+    "scene.system.require_field": "states that a kind of system has no such field",
+    "results.quantities.value_at": "a path leads through tables and through attributes",
+    "specification.layout.resolve": "`Auto` has some of the fields of `Effects`",
+    "common.fields._rule": "a type hint may have a rule",
+    "common.fields._is_sequence": "recognises arrays without importing NumPy",
+    "studies.workers.pool_from": "an executor of any library may state its number of workers",
+    "simulation.checkpoint.read_checkpoint": "what reading a damaged file raises",
+    "results.files.<module>": "what reading a damaged file raises",
+    "cli.console.<module>": "signals of the operating system",
+    "common.cores.usable_cores": "a function of the operating system",
+    "embedding.server.<module>": "an option of the operating system",
+    "simulation.memory._of_machine": "a function of the operating system",
+}
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 BROUGHT = {"markupsafe": "jinja2", "PIL": "matplotlib"}  # what a dependency requires itself
@@ -213,25 +229,50 @@ def keys_asked(node):
     return {part.value for part in parts if isinstance(part, ast.Constant)}
 
 
-def places_that_ask(node, classes, place="<module>"):
-    """The functions, by name, in which something asks for one of these classes or for a key of a kind."""
+def asks_for_an_attribute(node):
+    """Whether an expression depends on whether a value has an attribute, of any name."""
+    match node:
+        case ast.Call(func=ast.Name("hasattr")) | ast.Call(func=ast.Name("getattr"), args=[_, _, _]):
+            return True
+        case ast.Attribute(attr="__dataclass_fields__" | "model_fields") | ast.Name("AttributeError"):
+            return True
+    return False
+
+
+def places_that_ask(node, asks, place="<module>"):
+    """The functions, by name, with a part for which `asks` is true; errors that they raise are left out."""
     place = node.name if isinstance(node, ast.FunctionDef) else place
-    if classes_asked(node) & classes or keys_asked(node) & KEYS_OF_KINDS:
+    if asks(node):
         yield place
     for inner in ast.iter_child_nodes(node):
-        yield from places_that_ask(inner, classes, place)
+        if not isinstance(inner, ast.Raise):
+            yield from places_that_ask(inner, asks, place)
+
+
+def places_outside_buildings(asks):
+    """Dotted names of the functions outside `buildings` that ask. asks: gives for a folder what finds it in a part."""
+    for name, path in MODULES.items():
+        if not name.startswith("msfp_gen.buildings"):
+            inside = name.removeprefix("msfp_gen.")
+            yield from (f"{inside}.{place}" for place in places_that_ask(tree_of(path), asks(path.parent)))
+
+
+def asking_for(classes):
+    """What says whether a part asks for one of these classes or for a key of a kind."""
+    return lambda node: bool(classes_asked(node) & classes or keys_asked(node) & KEYS_OF_KINDS)
 
 
 def test_few_functions_ask_for_the_kind_of_a_system():
     """What a system or a result can do stands in its class, in its `Kind`, or in functions that kinds register for."""
-    found, classes = set(), classes_of_kinds()
+    classes = classes_of_kinds()
     assert {"Scene", "BuildingScene", "Result", "BuildingResult", "History", "BuildingCharacterisation"} <= set(classes)
-    for name, path in MODULES.items():
-        if not name.startswith("msfp_gen.buildings"):
-            others = {kind for kind, folder in classes.items() if folder != path.parent}
-            inside = name.removeprefix("msfp_gen.")
-            found |= {f"{inside}.{place}" for place in places_that_ask(tree_of(path), others)}
-    assert found == set(KIND_SWITCHES)
+    found = places_outside_buildings(lambda own: asking_for({kind for kind in classes if classes[kind] != own}))
+    assert set(found) == set(KIND_SWITCHES)
+
+
+def test_few_functions_ask_whether_a_value_has_an_attribute():
+    """A system, a result or a top has every attribute that is asked of it; one that it lacks may stand for its kind."""
+    assert set(places_outside_buildings(lambda _: asks_for_an_attribute)) == set(ATTRIBUTE_SWITCHES)
 
 
 def test_what_a_building_says_of_its_bearings_stays_in_the_results():
@@ -258,8 +299,28 @@ def _(result):
 
 
 def test_the_reader_of_switches_sees_them():
-    assert list(places_that_ask(ast.parse(SWITCHES), {"Result"})) == ["_"] * 8
-    assert not list(places_that_ask(ast.parse("result.history == Result(1)\nresult['position']"), {"Result"}))
+    asks = asking_for({"Result"})
+    assert list(places_that_ask(ast.parse(SWITCHES), asks)) == ["_"] * 8
+    assert not list(places_that_ask(ast.parse("result.history == Result(1)\nresult['position']"), asks))
+
+
+ATTRIBUTES = """
+def _(system):
+    hasattr(system, "stop")
+    getattr(system, "stop", None)
+    "stop" in system.__dataclass_fields__
+    "stop" in type(system).model_fields
+    suppress(AttributeError)
+    try:
+        system.stop
+    except (KeyError, AttributeError):
+        raise AttributeError("stop")
+"""
+
+
+def test_the_reader_of_attributes_sees_them():
+    assert list(places_that_ask(ast.parse(ATTRIBUTES), asks_for_an_attribute)) == ["_"] * 6
+    assert not list(places_that_ask(ast.parse("getattr(system, name)"), asks_for_an_attribute))
 
 
 def test_a_run_loads_the_core_alone():

@@ -13,7 +13,9 @@ LINKED = {"generator", "templates"}  # the same folders again, under their impor
 SOURCES = [p for p in (ROOT / "msfp_gen").rglob("*.py") if not LINKED & set(p.relative_to(ROOT).parts)]
 ARRAY = re.compile(r"\b(Array|ndarray|NDArray)\b")
 # `shape (k, 3)`, `(k, 3)`, `(u,)`, the dimensions of a row of a result, or where it is described.
-SHAPE = re.compile(r"\bshapes?\b|\((?:[\w.+* -]+,)+[\w.+* -]*\)|\bRows\(|\b[Ss]ee `|\b[Aa]s (?:of |in )?`", re.ASCII)
+SHAPE = re.compile(
+    r"\bshapes?\b|\((?:[\w.+* -]+,)+[\w.+* -]*\)|\bRowField\(|\b[Ss]ee `|\b[Aa]s (?:of |in )?`", re.ASCII
+)
 # `[m/s^2]`, `[N, N m]`, `[-]` for a number, `[SI]` where numbers of several units are side by side, the unit of another
 # value, the dimensions of a row of a result, or where it is described. Truth values and indices have no unit.
 SYMBOL = r"(?:1|m|s|kg|N|J|W|Pa|K|degC|rad|Hz|g)(?:\^-?\d)?"
@@ -21,7 +23,7 @@ UNITS = rf"{SYMBOL}(?:[ /]{SYMBOL})*"
 OF_ANOTHER = r"unit|its unit(?: squared)?|(?:\w+ )*units? of [^\]]+"
 UNIT = re.compile(
     rf"\[(?:-|SI|{UNITS}(?:, {UNITS})*|{OF_ANOTHER})\]"
-    r"|\bRows\(|\b[Ss]ee `|\b[Aa]s (?:of|in) `|\bunits? (?:of|in) `",
+    r"|\bRowField\(|\b[Ss]ee `|\b[Aa]s (?:of|in) `|\bunits? (?:of|in) `",
     re.ASCII,
 )
 UNITLESS_ARRAY = re.compile(r"(?:NDArray\[|ndarray\[Any, np\.dtype\[)np\.(?:bool_|intp|int64)\]")
@@ -63,7 +65,7 @@ def unstated(text: str) -> Iterator[str]:
 
 def test_the_reader_sees_what_has_no_shape_or_unit() -> None:
     text = '''
-class Rows:
+class History:
     """Rows.
 
     Attributes:
@@ -93,7 +95,13 @@ def mean(x: Array) -> Array:
 def total(x: Array) -> tuple[float, Array]:
     """The total."""
 '''
-    missing = ["shape of Rows.force", "shape of Rows.peak", "unit of Rows.at", "shape of total", "unit of total"]
+    missing = [
+        "shape of History.force",
+        "shape of History.peak",
+        "unit of History.at",
+        "shape of total",
+        "unit of total",
+    ]
     assert list(unstated(text)) == missing
 
 

@@ -46,7 +46,7 @@ ELSEWHERE = {
     "motions/records/__init__.py": "tests/unit/motions/records/test_record_fuzz.py",
     "motions/records/text.py": "tests/unit/motions/records/test_record_fuzz.py",
     "studies/assessment/rows.py": "tests/unit/studies/test_study_runs.py",
-    "studies/estimation/source.py": "tests/unit/studies/test_estimate.py",
+    "studies/estimation/model_runs.py": "tests/unit/studies/test_estimate.py",
     "cli/sheet_commands.py": "tests/unit/design/test_equivalent.py",
     "jit/cache.py": "tests/unit/jit/test_cache_safety.py",
     "motions/records/peer.py": "tests/unit/motions/records/test_record_fuzz.py",
@@ -158,14 +158,14 @@ def archive() -> bytes:
 
 def checkpoint_bytes(folder: Path) -> bytes:
     segments = [checkpoint.Saved("b", 1.0, 2.0, b"snapshot"), checkpoint.Saved("c", 2.0, 1.0, b"another")]
-    checkpoint.write(folder / "good", checkpoint.Identity("name = 'a'\n", "d"), segments)
+    checkpoint.write_checkpoint(folder / "good", checkpoint.Identity("name = 'a'\n", "d"), segments)
     return (folder / "good").read_bytes()
 
 
 def read_checkpoint(path: Path) -> None:
     """As a run reads it, which makes one line of a ValueError or an OSError."""
     try:
-        _, segments = checkpoint.read(path)
+        _, segments = checkpoint.read_checkpoint(path)
     except ValueError as error:
         raise InputError("checkpoint: damaged") from error
     assert all(np.isfinite(each.wall) for each in segments)

@@ -3,57 +3,85 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from external import MAT, mat_on_pendulums
 from support import ROOT
-from support.audits import SPACE, SPOILED, rows_of, run_of, shaken, straightened, with_columns, with_force
+from support.audits import (
+    KINDS,
+    SPACE,
+    SPOILED,
+    other_radii,
+    rows_of,
+    run_of,
+    shaken,
+    straightened,
+    with_columns,
+    with_force,
+)
+from support.buildings import BEARING, rocking
 
-from msfp_gen import audit, load_scene, simulate
-from msfp_gen.auditing import Histories
+from msfp_gen import Effects, RunError, audit, changed_scene, load_scene, simulate
+from msfp_gen.auditing import Histories, read_histories
 from msfp_gen.auditing.histories import histories_of
 from msfp_gen.auditing.momentum import momentum
 from msfp_gen.auditing.sliding import Sliding
 from msfp_gen.auditing.stated import stated_of
 from msfp_gen.studies.accuracy.series import run_opensees
 
+KINDS_OF_STACKS = [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "triple")) for kind in KINDS]
+# Named alone; the others are named with what follows from them.
+ALONE = {"sign turned", "clipped", "unit wrong", "resampled", "half the bearings", "heat off", "friction at the pivot"}
+
 
 @cache
-def spoiled(name):
+def spoiled(kind, name):
     """The audit of a spoiled result, and the check that must name it."""
-    data, bearing, check = SPOILED[name]()
+    data, bearing, check = SPOILED[name](KINDS[kind])
     return audit(data, bearing), check, data
 
 
 @pytest.mark.parametrize("name", SPOILED)
-def test_what_is_spoiled_is_named(name):
-    found, check, data = spoiled(name)
-    assert check in [finding.check for finding in found.inconsistent]
+@pytest.mark.parametrize("kind", KINDS_OF_STACKS)
+def test_what_is_spoiled_is_named(kind, name):
+    """Of an articulated and a double pendulum in a plane, and of a triple pendulum in space."""
+    found, check, data = spoiled(kind, name)
+    named = [finding.check for finding in found.inconsistent]
+    assert named == [check] if name in ALONE else check in named
     place = found.finding(check)
     assert place.time is None or data.time[0] <= place.time <= data.time[-1]
 
 
-def test_one_mistake_hides_and_makes_no_other():
-    """Signs, units, bearings and heat are named alone; the others with what follows from them."""
-    alone = {"sign turned", "clipped", "unit wrong", "half the bearings", "heat off", "friction at the pivot"}
-    for name in alone:
-        found, check, _ = spoiled(name)
-        assert [finding.check for finding in found.inconsistent] == [check], name
+@pytest.mark.parametrize("kind", KINDS_OF_STACKS)
+def test_numbers_of_every_kind(kind):
+    """The inertia, the fall by heat, the coupling and the radius that were put in, and friction at the pivot."""
+    numbers = {name: spoiled(kind, name)[0].finding(spoiled(kind, name)[1]) for name in SPOILED}
+    mass = 2e6 / KINDS[kind].scene().bearing.gravity
+    assert numbers["mass doubled"].value == pytest.approx(2 * mass, rel=0.01)
+    assert numbers["half the bearings"].value == pytest.approx(0.5, rel=0.01)
+    for name in ("heat off", "vertical coupling off"):
+        assert numbers[name].value == pytest.approx(0.0, abs=0.05)
+    assert "at the pivot" in numbers["friction at the pivot"].sentence
+    radius = stated_of(KINDS[kind].scene(radius=other_radii)).radius
+    assert numbers["other radius"].value == pytest.approx(radius, rel=0.02)
+
+
+@pytest.mark.parametrize("kind", KINDS_OF_STACKS)
+def test_sound_results_of_every_kind(kind):
+    for law in ("constant", "pvt"):
+        found = audit(KINDS[kind].run(law=law), KINDS[kind].scene(law=law))
+        assert {finding.verdict for finding in found.findings} == {"consistent"}
+        assert law == "constant" or found.finding("heat").value == pytest.approx(1.0, abs=0.05)
 
 
 def test_numbers_are_those_that_were_put_in():
-    found = {name: spoiled(name)[0].finding(spoiled(name)[1]) for name in SPOILED}
-    mass = 2e6 / shaken().bearing.gravity
-    assert found["mass doubled"].value == pytest.approx(2 * mass, rel=0.01)
+    found = {name: spoiled("single", name)[0].finding(spoiled("single", name)[1]) for name in SPOILED}
     assert "inertia acts twice" in found["mass doubled"].sentence
-    assert found["heat off"].value == pytest.approx(0.0, abs=0.05)
     assert found["friction at the pivot"].value == pytest.approx(0.928, abs=0.01)
-    assert "at the pivot" in found["friction at the pivot"].sentence
     assert found["unit wrong"].value == 1e3 and "millimetres" in found["unit wrong"].sentence
-    assert found["vertical coupling off"].value == pytest.approx(0.0, abs=0.05)
-    assert found["half the bearings"].value == pytest.approx(0.5, rel=0.01)
     assert found["other radius"].value == pytest.approx(2.69, rel=0.01)  # of the dish and the joint
 
 
@@ -151,6 +179,82 @@ def test_presets_are_sound(name):
     assert not found.inconsistent, found.text
 
 
+def even(data, step=0.01):
+    """The histories at equal steps, as a recorder has them."""
+    time = np.arange(0.0, data.time[-1], step)
+    columns = {name: np.interp(time, data.time, values) for name, values in data.columns.items()}
+    return replace(data, columns=columns | {"time": time})
+
+
+@pytest.mark.parametrize(
+    "scale", [2.0, pytest.param(3.0, marks=pytest.mark.slow), pytest.param(4.0, marks=pytest.mark.slow)]
+)
+def test_sound_results_with_strong_lift_off(scale):
+    """A bearing that opens and lands up to thirty times; at four times the record its stack comes apart at 10 s.
+
+    The force on the mass has the inertia of the upper plate, which hangs on it while surfaces are open.
+    """
+    scene = changed_scene("ridgecrest-clc", {"motion.scale": scale, "effects.uplift": True, "duration": 14.0})
+    try:
+        result = simulate(scene)
+    except RunError as failure:
+        result = failure.result
+        assert scale == 4.0 and failure.status == "separated"
+    data = histories_of(result)
+    force = result.history.top_force
+    on_mass = with_columns(data, axial=force[:, 2], force_1=force[:, 0], force_2=force[:, 1])
+    assert data.below(0.02).any() and on_mass.axial.min() < -0.02 * data.at_rest
+    for given in (data, on_mass, even(data), even(on_mass)):
+        found = audit(given, scene)
+        assert not found.inconsistent, found.text
+        assert found.finding("weight").verdict == "consistent"
+        assert found.finding("weight").value == pytest.approx(1.0, abs=0.01)
+
+
+def test_rims_that_yield_are_no_missing_rims():
+    """A triple pendulum under a load for which it is not made, 60 mm beyond its last rim; and without the rims."""
+    scene = shaken(bearing="fenz-tfp", scale=0.5, axes=(1.0, 0.0, 0.0), contact_damping=0.0)
+    data = histories_of(simulate(scene))
+    found = audit(data, scene)
+    assert not found.inconsistent and found.finding("travel").value > 0.2
+    sliding = data.axial * (data.displacement[:, 0] / 0.87 + 0.07 * np.sign(data.velocity[:, 0]))
+    assert audit(with_columns(data, force_1=sliding), scene).finding("travel").verdict == "inconsistent"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("vertical", [5.0, 8.0])
+@pytest.mark.parametrize("law", ["constant", "pvt"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_sound_results_of_stacks_that_lift_off(kind, law, vertical):
+    """Base motions of up to 1.1 and 1.8 g along the vertical: surfaces are open for up to two thirds of the time."""
+    choices = KINDS[kind].choices | {"axes": (0.6, 0.6 * (kind == "triple"), vertical), "law": law, "uplift": True}
+    scene = shaken(**choices)
+    try:
+        data = histories_of(simulate(scene))
+    except RunError as failure:  # a stack that has come apart
+        assert failure.status == "separated"
+        data = histories_of(failure.result)
+    assert data.below(0.02).sum() > 40
+    found = audit(data, scene)
+    assert not found.inconsistent, [finding.sentence for finding in found.inconsistent]
+
+
+def test_sound_results_of_a_building_that_rocks():
+    """Two of its bearings lift off; rows of a bearing of a building have the force on its upper plate only."""
+    result = simulate(rocking(Effects(uplift=True)))
+    lifted = 0
+    for bearing in result.bearings:
+        rows = bearing.history
+        columns = {"time": rows.time, "axial": rows.top_force[:, 2], "rise": -rows.displacement[:, 2]}
+        for name, values in (("displacement", rows.displacement), ("force", rows.top_force)):
+            columns |= {f"{name}_{axis + 1}": values[:, axis] for axis in (0, 1)}
+        data = Histories("a bearing", columns)
+        found = audit(data, BEARING)
+        assert not found.inconsistent, found.text
+        lifted += data.below(0.02).any()
+    assert lifted == 2
+
+
 def test_the_bound_of_a_stack_is_reached():
     """In stage III of Fenz and Constantinou both outermost surfaces of a triple pendulum slide."""
     scene = load_scene("fenz-test3")
@@ -171,6 +275,24 @@ def test_a_published_plant_has_its_inertia_twice():
     assert "7.495e+07" in found.finding("mass").sentence and "inertia acts twice" in found.finding("mass").sentence
     assert found.finding("friction").value == pytest.approx(1.0, abs=0.01)
     assert found.finding("radius").value == pytest.approx(1.0, abs=0.01)
+    assert found.finding("friction_bound").value == pytest.approx(0.06, abs=1e-4)
+
+
+def test_the_plant_has_constant_friction():
+    """Its force gives the coefficient 0.0600 at any velocity, and 377 MN/m before it slides."""
+    data = read_histories(MAT / "case1.csv", MAT / "map.toml")
+    axial, force, u = data.axial[30:], data.force[30:, 0], data.displacement[30:, 0]
+    speed = np.abs(data.velocity[30:, 0])
+    implied = np.abs(force / axial - u)
+    path = np.cumsum(np.abs(np.diff(u, prepend=u[0])))
+    turned = np.maximum.accumulate(np.where(np.diff(np.sign(np.gradient(u)), prepend=0) != 0, path, 0.0))
+    sliding = (path - turned > 4e-3) & (data.time[30:] > 1.0)
+    for low, high in ((0.002, 0.01), (0.01, 0.05), (0.05, 0.3), (0.3, 1.0)):
+        rows = sliding & (speed > low) & (speed < high)
+        assert rows.sum() > 20 and np.median(implied[rows]) == pytest.approx(0.06, abs=2e-5)
+    stiffness = data.force[1, 0] / data.displacement[1, 0]
+    assert stiffness == pytest.approx(50e6 * np.pi * 0.2**2 * 0.06 / 1e-3, rel=0.01)
+    assert 0.06 * data.at_rest / stiffness == pytest.approx(1.71e-3, rel=0.01)
 
 
 def test_the_page_of_the_plant_prints_what_it_says(capsys, monkeypatch):
@@ -186,7 +308,7 @@ def test_the_page_of_the_plant_prints_what_it_says(capsys, monkeypatch):
 
 @pytest.mark.slow
 def test_the_plant_is_followed_with_inertia_twice():
-    """RMS difference of the displacement over its largest value: 2.5 % with inertia twice, 24 % with it once."""
+    """RMS difference of the displacement over its largest value: 1.8 % with inertia twice, 24 % with it once."""
     apart = {}
     page = (ROOT / "docs" / "audit.md").read_text(encoding="utf-8").split("\n## A published plant\n")[1]
     for times, word in ((1, "once"), (2, "twice")):
@@ -196,19 +318,20 @@ def test_the_plant_is_followed_with_inertia_twice():
         assert row
         stated = [float(text) for text in row.groups()]
         assert stated == pytest.approx([1e3 * ours.max(), -1e3 * ours.min(), 100 * apart[times]], abs=0.1)
-    assert apart[2] == pytest.approx(0.025, abs=2e-3) and apart[1] == pytest.approx(0.24, abs=0.01)
+    assert apart[2] == pytest.approx(0.018, abs=1e-3) and apart[1] == pytest.approx(0.24, abs=0.01)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["constant", "velocity", "pvt"])
 @pytest.mark.parametrize("axes", [(1.0, 0.0, 0.0), SPACE])
-@pytest.mark.parametrize("kind", ["single-articulated-push", "double-push", "triple-push"])
+@pytest.mark.parametrize("kind", ["single-articulated-fp", "double-fp", "fenz-tfp"])
 def test_sound_results_of_stacks(law, axes, kind):
     """Small and strong motions, and coarse rows; a triple pendulum of 150 mm, without rims here, is moved less."""
     changes = {"friction_slow": 0.03, "velocity_rate": 150.0} if law == "velocity" else {}
-    share = {"pvt": 0.08}.get(law, 0.15) if kind == "triple-push" else 1.0
+    share = {"pvt": 0.08}.get(law, 0.15) if kind == "fenz-tfp" else 1.0
+    changes |= {"contact_damping": 0.0} if kind == "fenz-tfp" else {}
     for scale, step in ((0.3, 0.01), (1.0, 0.01), (1.0, 0.04)):
-        choices = {"law": law, "axes": axes, "preset": kind, "scale": share * scale, "step": step, **changes}
+        choices = {"law": law, "axes": axes, "bearing": kind, "scale": share * scale, "step": step, **changes}
         found = audit(run_of(**choices), shaken(**choices))
         assert not found.inconsistent, (scale, step, [f.sentence for f in found.inconsistent])
 

@@ -19,7 +19,7 @@ from msfp_gen import (
     Top,
     simulate,
 )
-from msfp_gen.buildings import scene as selection
+from msfp_gen.buildings import effects as selection
 from msfp_gen.buildings.result import BuildingResult
 
 LIFTING = Effects(uplift=True)

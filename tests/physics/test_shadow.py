@@ -108,7 +108,7 @@ def test_tension_parts_the_surfaces_of_the_model():
     pulled = found.data.time[found.data.axial < -0.1 * found.data.at_rest]
     inside = [any(start <= time <= start + length for start, length in found.openings) for time in pulled]
     assert np.mean(inside) > 0.8 and found.opened is not None
-    assert "-477.5 kN" in found.lift_off and "surfaces part" in found.lift_off
+    assert f"{found.data.axial.min() / 1e3:.4g} kN" in found.lift_off and "surfaces part" in found.lift_off
     assert shadow(across(run_of()), shaken()).lift_off == ""
 
 

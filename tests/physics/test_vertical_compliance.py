@@ -26,7 +26,7 @@ from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
 from msfp_gen.scene.standing import seat_stiffness
-from msfp_gen.simulation.start import RestartState, start_run
+from msfp_gen.simulation.start import RestartState, start_compiled_run
 
 BEARING = presets.bearing("fenz-tfp")
 MASS, GRAVITY = 11e3, BEARING.gravity
@@ -276,11 +276,11 @@ def restarted(first: Effects, then: Effects, at: float, **changes: Any) -> tuple
     """The row that ends a segment and the one that begins the next, with the foot, as arrays by name."""
     given = scene(SWAY, sprung(), first, **changes)
     models = [build_model(BEARING.layout, effects) for effects in (first, then)]
-    run, azimuth = start_run(given, models[0], given.effect_selection, at, None, ())
+    run, azimuth = start_compiled_run(given, models[0], given.effect_selection, at, None, ())
     while run.advance():
         pass
     end = RestartState.of(models[0], run, azimuth)
-    following, _ = start_run(given, models[1], given.effect_selection, 1.0, end, ())
+    following, _ = start_compiled_run(given, models[1], given.effect_selection, 1.0, end, ())
     rows = [model.unpack(each.rows[-1]) for model, each in zip(models, (run, following), strict=True)]
     feet = [
         model.extension.read_state(each.snapshot(rows=1))["foot"]

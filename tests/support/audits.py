@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen import Effects, Load, Motion, Scene, Solver, Top, load_scene, simulate
+from msfp_gen import Bearing, Effects, Load, Motion, Scene, Solver, Top, presets, simulate
 from msfp_gen.auditing import Histories
 from msfp_gen.auditing.histories import histories_of
 
@@ -37,20 +38,20 @@ def shaken(
     axes: tuple[float, float, float] = PLANE,
     inertia: float = 1.0,
     step: float = STEP,
-    preset: str = "single-articulated-push",
+    bearing: str = "single-articulated-fp",
     uplift: bool = False,
     **changes: Any,
 ) -> Scene:
     """A mass on one bearing, an articulated pendulum unless a preset is named, under `ground`.
 
-    axes: factors of the components. inertia: of the mass, which keeps its weight. changes: of the bearing.
+    axes: factors of the components. inertia: of the mass, which keeps its weight. changes: of the bearing, or functions
+    of its surfaces that make them.
     """
-    bearing = load_scene(preset).bearing
+    given = presets.bearing(bearing)
     if law in ("pv", "pvt"):
-        table = {"reference_pressure": 44.2e6, "velocity_rate": 100.0}
-        bearing = bearing.replace(**table)
-    bearing = bearing.replace(**changes)
-    mass = WEIGHT / bearing.gravity
+        given = given.replace(reference_pressure=44.2e6, velocity_rate=100.0)
+    given = given.replace(**{name: value(given) if callable(value) else value for name, value in changes.items()})
+    mass = WEIGHT / given.gravity
     damper = 0.2 * np.sqrt(600.0 * WEIGHT * mass)
     top = Top.mass(inertia * mass, 1e4, 0.0, 1e10, 1e6, 600.0 * WEIGHT, damper)
     load = Load.constant((0.0, 0.0, (inertia - 1.0) * WEIGHT)) if inertia != 1.0 else None
@@ -58,16 +59,13 @@ def shaken(
     dimension: Any = "spatial" if axes[1] else "planar"
     effects = Effects(dimension=dimension, friction=law, uplift=uplift)
     motion, solver = ground(scale, axes), Solver(rtol=1e-4)
-    return Scene(bearing, motion, top, effects, solver, output_step=step, load=load, name="shaken")
+    return Scene(given, motion, top, effects, solver, output_step=step, load=load, name="shaken")
 
 
 @cache
 def run_of(**choices: Any) -> Histories:
     """Histories of a shaken mass."""
     return histories_of(simulate(shaken(**choices)))
-
-
-AT_PIVOT = 0.06 * 0.928  # friction of this pendulum at its surfaces, if 0.06 acted at the pivot
 
 
 def with_columns(data: Histories, **columns: np.ndarray) -> Histories:
@@ -111,28 +109,67 @@ def uncoupled(data: Histories) -> Histories:
     return with_force(data, data.at_rest / data.axial)
 
 
-def damped(data: Histories, ratio: float = 0.05) -> Histories:
+def damped(data: Histories, ratio: float = 0.05, radius: float = 2.19) -> Histories:
     """A share of the critical damping of the isolated mass, in the force of the bearing."""
-    viscous = 2 * ratio * WEIGHT * np.sqrt(1 / 9.81 / 2.19)
+    viscous = 2 * ratio * WEIGHT * np.sqrt(1 / 9.81 / radius)
     return with_force(data, 1.0, viscous * data.velocity)
 
 
-# Name of a spoiled result -> histories, what the bearing is said to be, and the checks of which one must name it.
-SPOILED = {
-    "mass doubled": lambda: (replace(run_of(inertia=2.0), mass=None), shaken(), "mass"),
-    "heat off": lambda: (run_of(law="pvt", temperature_ratio=1.0), shaken(law="pvt"), "heat"),
-    "friction at the pivot": lambda: (run_of(friction=(AT_PIVOT, AT_PIVOT)), shaken(), "friction"),
-    "sign turned": lambda: (with_force(run_of(), -1.0), shaken(), "signs"),
-    "clipped": lambda: (cut(run_of(), "force_1", 0.8), shaken(), "clipped"),
-    "resampled": lambda: (rows_of(run_of(), 15), shaken(), "sampling"),
-    "unit wrong": lambda: (run_of().scaled({"displacement_1": 1e3, "displacement_2": 1e3}), shaken(), "units"),
-    "tension allowed": lambda: (tensile(run_of()), shaken(), "tension"),
-    "vertical coupling off": lambda: (uncoupled(run_of()), shaken(), "coupling"),
-    "damping of the structure": lambda: (damped(run_of()), shaken(), "damping"),
-    "half the bearings": lambda: (
-        with_columns(with_force(run_of(), 0.5), axial=0.5 * run_of().axial),
-        shaken(),
+def frictions(bearing: Bearing) -> list[float]:
+    """Coefficients of the surfaces, as given."""
+    return [surface.friction for surface in bearing.surfaces]
+
+
+def other_radii(bearing: Bearing) -> list[float]:
+    """The radii with those of the dishes, which are the largest, 23 % larger."""
+    radii = [surface.radius for surface in bearing.surfaces]
+    return [radius * (1.23 if radius == max(radii) else 1.0) for radius in radii]
+
+
+class Kind(NamedTuple):
+    """What is spoiled: choices of `shaken`, and the distance of its centres [m]."""
+
+    choices: dict[str, Any]
+    radius: float
+
+    def run(self, **changes: Any) -> Histories:
+        """Its histories."""
+        return run_of(**self.choices, **changes)
+
+    def scene(self, **changes: Any) -> Scene:
+        """Its scene."""
+        return shaken(**self.choices, **changes)
+
+
+KINDS = {
+    "single": Kind({}, 2.19),
+    "double": Kind({"bearing": "double-fp"}, 4.2),
+    "triple": Kind({"bearing": "building-tfp", "axes": SPACE}, 3.48),
+}
+# Name of a spoiled result -> histories, what the bearing is said to be, and the check that must name it.
+SPOILED: dict[str, Callable[[Kind], tuple[Histories, Scene, str]]] = {
+    "mass doubled": lambda kind: (replace(kind.run(inertia=2.0), mass=None), kind.scene(), "mass"),
+    "heat off": lambda kind: (kind.run(law="pvt", temperature_ratio=1.0), kind.scene(law="pvt"), "heat"),
+    "friction at the pivot": lambda kind: (
+        kind.run(friction=frictions, friction_at="pivot"),
+        kind.scene(),
+        "friction",
+    ),
+    "sign turned": lambda kind: (with_force(kind.run(), -1.0), kind.scene(), "signs"),
+    "clipped": lambda kind: (cut(kind.run(), "force_1", 0.8), kind.scene(), "clipped"),
+    "resampled": lambda kind: (rows_of(kind.run(), 15), kind.scene(), "sampling"),
+    "unit wrong": lambda kind: (
+        kind.run().scaled({"displacement_1": 1e3, "displacement_2": 1e3}),
+        kind.scene(),
+        "units",
+    ),
+    "tension allowed": lambda kind: (tensile(kind.run()), kind.scene(), "tension"),
+    "vertical coupling off": lambda kind: (uncoupled(kind.run()), kind.scene(), "coupling"),
+    "damping of the structure": lambda kind: (damped(kind.run(), radius=kind.radius), kind.scene(), "damping"),
+    "half the bearings": lambda kind: (
+        with_columns(with_force(kind.run(), 0.5), axial=0.5 * kind.run().axial),
+        kind.scene(),
         "weight",
     ),
-    "other radius": lambda: (run_of(radius=(2.7, 0.16)), shaken(), "radius"),
+    "other radius": lambda kind: (kind.run(radius=other_radii), kind.scene(), "radius"),
 }

@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 
 from msfp_gen import Auto, BaseSlab, Bearing, Building, Effects, Motion, Solver, Storey, Top, presets, simulate
+from msfp_gen.buildings.bearing import BuildingBearing
 from msfp_gen.buildings.extremes import OF_SURFACES, BuildingExtremes, corner_points
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
+from msfp_gen.buildings.scene import BuildingScene
 
 BEARING = presets.bearing("fenz-tfp").replace(contact_damping=1e-4)
 LOAD = 112e3  # on each bearing on average [N]

@@ -9,7 +9,7 @@ import numpy as np
 
 from msfp_gen import Scene, build_model
 from msfp_gen.model.model import Model
-from msfp_gen.simulation.start import start_run
+from msfp_gen.simulation.start import start_compiled_run
 from support import ROOT
 
 REPLAY = ROOT / "tests" / "support" / "c" / "replay.c"
@@ -37,7 +37,7 @@ def inputs(scene: Scene) -> str:
 
     recorder: Any = ModuleType("recorder")
     recorder.Stack, recorder.Run = stack, run
-    start_run(scene, Model(model.spec, recorder, model.info), scene.effect_selection, scene.end, None, ())
+    start_compiled_run(scene, Model(model.spec, recorder, model.info), scene.effect_selection, scene.end, None, ())
     words = [np.atleast_1d(np.asarray(value)).ravel() for value in seen]
     return "\n".join(
         " ".join(repr(x.item()) for x in row.astype(row.dtype if row.dtype != bool else int)) for row in words

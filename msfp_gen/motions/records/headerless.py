@@ -16,7 +16,7 @@ FORMAT = "numbers without a header"
 _BETWEEN = re.compile(r"\s*[,;]\s*|\s+")
 _SEQUENCE = 4  # columns from which the rows of a file with a time step are one sequence, as in PEER files
 
-Row = tuple[int, list[str]]  # index of the line, its fields
+NumberedLine = tuple[int, list[str]]  # index of the line, its fields
 
 
 def matches(lines: Lines) -> bool:
@@ -54,7 +54,7 @@ def read(parts: Sequence[Lines], unit: str | None, time_step: float | None) -> R
     return assemble_record(channels, FORMAT, notes)
 
 
-def _values(lines: Lines, rows: list[Row], time_step: float | None) -> tuple[Array, float]:
+def _values(lines: Lines, rows: list[NumberedLine], time_step: float | None) -> tuple[Array, float]:
     """Values of the rows of a file, shape (k, columns), and its time step [s]."""
     first, width = rows[0][0], len(rows[0][1])
     sequence = time_step is not None and width >= _SEQUENCE
@@ -79,9 +79,9 @@ def _values(lines: Lines, rows: list[Row], time_step: float | None) -> tuple[Arr
     return np.array(numbers), time_step
 
 
-def _rows(lines: Lines, most: int | None = None) -> list[Row]:
+def _rows(lines: Lines, most: int | None = None) -> list[NumberedLine]:
     """Index and fields of the lines that are neither blank nor comments, at most so many."""
-    found: list[Row] = []
+    found: list[NumberedLine] = []
     for index, line in enumerate(lines.lines):
         if (text := line.strip().rstrip(",;")) and not text.startswith(("#", "%")):
             found.append((index, _BETWEEN.split(text)))

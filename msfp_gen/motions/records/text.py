@@ -158,7 +158,7 @@ def read_lines(path: Path) -> Lines:
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        reason = getattr(error, "strerror", None) or error
+        reason = (error.strerror if isinstance(error, OSError) else "") or error
         raise InputError(f"{path.name}: cannot be read ({reason}); check the path") from None
     return lines_of(path, content)
 

@@ -19,12 +19,12 @@ from msfp_gen.scene.system import kinds
 PRESET_EFFECTS = {"dimension": "spatial", "sliders": "inertial", "rims": True, "uplift": False}
 
 
-def bearing_table(name: str) -> SceneTable:
+def preset_bearing_table(name: str) -> SceneTable:
     """The bearing preset `name`, without its description; raises InputError for an unknown name."""
     return _find("bearing", name)
 
 
-def scene_table(name: str) -> SceneTable:
+def preset_scene_table(name: str) -> SceneTable:
     """The preset `name` of a scene of one bearing, complete, without its description; raises InputError without one."""
     table = _find("scene", name)
     return table | {"name": name, "effects": {**PRESET_EFFECTS, **table.get("effects", {})}}
@@ -33,25 +33,25 @@ def scene_table(name: str) -> SceneTable:
 def preset_table(name: str) -> SceneTable | None:
     """The complete table of a scene preset, of one bearing or of another kind; None: there is none of that name."""
     if name in _tables("scene"):
-        return scene_table(name)
+        return preset_scene_table(name)
     return next((_find(word, name) | {"name": name} for word in kinds() if name in _tables(word)), None)
 
 
-def words() -> tuple[str, ...]:
+def words_of_presets() -> tuple[str, ...]:
     """The words for what presets are of: bearings, scenes of one bearing, and the other kinds of systems."""
     return ("bearing", "scene", *kinds())
 
 
 def descriptions(word: str) -> dict[str, str]:
-    """Name -> one line of description of each preset, by one of `words`. Raises InputError for another word."""
-    if word not in words():
-        raise InputError(f"kind = {word!r}: give one of {', '.join(map(repr, words()))}")
+    """Name -> one line of description of each preset, by one of `words_of_presets`. Raises InputError for another."""
+    if word not in words_of_presets():
+        raise InputError(f"kind = {word!r}: give one of {', '.join(map(repr, words_of_presets()))}")
     return {name: table["description"] for name, table in _tables(word).items()}
 
 
 def scene_descriptions() -> dict[str, str]:
     """Name -> one line of description of every scene preset of any kind."""
-    return {name: line for word in words()[1:] for name, line in descriptions(word).items()}
+    return {name: line for word in words_of_presets()[1:] for name, line in descriptions(word).items()}
 
 
 def suggestion(word: str, known: Mapping[str, Any] | list[str]) -> str:
@@ -102,7 +102,7 @@ def _find(word: str, name: str) -> SceneTable:
 
 @cache
 def _tables(word: str) -> dict[str, SceneTable]:
-    """Name -> table of each preset, by one of `words`. `[common]` lies under every table of its file."""
+    """Name -> table of each preset, by one of `words_of_presets`. `[common]` lies under every table of its file."""
     if word not in ("bearing", "scene"):
         folder = kinds()[word].presets
         return {} if folder is None else dict(_read(folder, lambda _: True))

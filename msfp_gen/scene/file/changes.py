@@ -16,7 +16,7 @@ from msfp_gen.scene.file.loader import MAX_DEPTH, complete_bearing, complete_par
 from msfp_gen.scene.file.schema import SCENE
 from msfp_gen.scene.system import kinds
 
-Key = str | int | None  # of a table, of a list, of all rows of a list
+PathKey = str | int | None  # of a table, of a list, of all rows of a list
 _STEP = re.compile(r"([^\[\].]+)((?:\[(?:\d+|\*)\])*)")
 NO_TABLES: Mapping[str, Any] = MappingProxyType({})
 ROWS = {"surfaces": Surface, "bodies": Body}
@@ -77,9 +77,9 @@ def multiplied_table(
     return changed
 
 
-def keys_of(path: str) -> list[Key]:
+def keys_of_path(path: str) -> list[PathKey]:
     """The keys of a path: names of tables, numbers of rows, None for all rows. Raises InputError."""
-    keys: list[Key] = []
+    keys: list[PathKey] = []
     for part in path.split("."):
         step = _STEP.fullmatch(part)
         if step is None:
@@ -93,14 +93,16 @@ def keys_of(path: str) -> list[Key]:
 
 def _places(walk: _Walk, path: str) -> Iterator[_Place]:
     """Every place to which a path leads. Raises InputError where surfaces are chosen and it is no column of them."""
-    keys = keys_of(path)
+    keys = keys_of_path(path)
     column = _COLUMNS.get(str(keys[-1]), ("", False))[0] if keys[-2:-1] == ["bearing"] else ""
     if walk.surfaces is not None and column != "surfaces":
         raise InputError("surfaces: this is no field of a surface; leave surfaces out")
     return _inner_places(walk, walk.root, keys)
 
 
-def _inner_places(walk: _Walk, inner: Any, keys: list[Key], common: Mapping[str, Any] = NO_TABLES) -> Iterator[_Place]:
+def _inner_places(
+    walk: _Walk, inner: Any, keys: list[PathKey], common: Mapping[str, Any] = NO_TABLES
+) -> Iterator[_Place]:
     """The places to which keys lead from `inner`, which is a copy, as all that they lead through becomes one."""
     # common: the tables that rows of a kind of systems have where they have none of their own.
     key, *rest = keys
@@ -155,7 +157,7 @@ def _rows(inner: Any, index: int | None) -> list[int]:
     return list(range(len(inner))) if index is None else [index]
 
 
-def _own_bearing(walk: _Walk, bearing: Any, following: Key) -> Any:
+def _own_bearing(walk: _Walk, bearing: Any, following: PathKey) -> Any:
     """A bearing as a table that can be changed; complete where a row of its surfaces or bodies is."""
     if isinstance(bearing, str):
         bearing = named_bearings(walk.root).get(bearing, {"preset": bearing})

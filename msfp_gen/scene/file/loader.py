@@ -27,12 +27,12 @@ from msfp_gen.scene.file import catalogue, schema
 from msfp_gen.scene.file.motion_tables import (
     LOADS,
     ROTATIONS,
-    Pieces,
+    PolynomialMotion,
     RecordMotion,
     history_from,
     located,
     motion_from,
-    table_of,
+    polynomials_of,
     with_spectrum,
 )
 from msfp_gen.scene.scene import Scene
@@ -234,7 +234,7 @@ def bearing_scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) ->
             **({} if motion == {} else {"motion": _motion_table(scene) if motion is None else motion}),
             "top": {"kind": scene.top.kind, **plain_table(scene.top)},
             **{name: plain_table(value) for name, value in tables.items() if value is not None},
-            **{name: table_of(value) for name, value in histories.items() if value is not None},
+            **{name: polynomials_of(value) for name, value in histories.items() if value is not None},
         }
     )
 
@@ -265,7 +265,7 @@ def _bearing(table: Mapping[str, Any]) -> Bearing:
 
 @lru_cache(maxsize=16)
 def _preset(name: str) -> Bearing:
-    return bearing_from_table(catalogue.bearing_table(name))
+    return bearing_from_table(catalogue.preset_bearing_table(name))
 
 
 def _row(kind: type, row: Mapping[str, Any], word: str, path: str) -> Any:
@@ -291,7 +291,7 @@ def _motion_table(scene: Scene) -> SceneTable:
     """The `[motion]` table of the scene file if it still makes the scene's motion, else its polynomials."""
     if scene.motion_table is not None and motion_from(scene.motion_table) == scene.motion:
         return {"kind": scene.motion_table["kind"], **scene.motion_table}
-    return Pieces.of(scene.motion)
+    return PolynomialMotion.of(scene.motion)
 
 
 def plain_table(value: Any) -> SceneTable:

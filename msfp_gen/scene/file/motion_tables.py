@@ -28,7 +28,7 @@ _FREQUENCY, _ANGULAR = Quantity("Hz", above=0.0), Quantity("rad/s", above=0.0)
 _TIMES = Quantity("s", least=0.0, shape=(None,))
 _FORCE, _MOMENT, _ANGLE = Quantity("N", shape=(3,)), Quantity("N m", shape=(3,)), Quantity("rad")
 _NONE = (0.0, 0.0, 0.0)
-Rows = tuple[tuple[float, ...], ...]
+Vectors = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,8 +84,8 @@ class SampledLoad(HistoryTable):
 
     kind, of, make = "samples", Load, "from_arrays"
     time: Annotated[tuple[float, ...], _TIMES]
-    force: Annotated[Rows, Quantity("N", shape=(None, 3))]
-    moment: Annotated[Rows | None, Quantity("N m", shape=(None, 3))] = None
+    force: Annotated[Vectors, Quantity("N", shape=(None, 3))]
+    moment: Annotated[Vectors | None, Quantity("N m", shape=(None, 3))] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +123,7 @@ class SampledRotation(HistoryTable):
 
     kind, of, make = "samples", Rotation, "from_arrays"
     time: Annotated[tuple[float, ...], _TIMES]
-    angles: Annotated[Rows, Quantity("rad", shape=(None, 2))]
+    angles: Annotated[Vectors, Quantity("rad", shape=(None, 2))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,7 +156,7 @@ def history_from(kinds: Mapping[str, type[HistoryTable]], table: Mapping[str, An
         raise InputError(path + text if text != str(error) else f"{path}: {text}") from None
 
 
-def table_of(history: Prescribed) -> dict[str, Any]:
+def polynomials_of(history: Prescribed) -> dict[str, Any]:
     """The table of any load or rotation history: its polynomials."""
     table: dict[str, Any] = {"kind": "pieces", "knots": history.knots.tolist()}
     table["coefficients"] = history.coefficients.tolist()
@@ -208,7 +208,7 @@ class MotionTable:
 
         It is made once for each table and contents of its files, as long as it is among those that were made last.
         """
-        if isinstance(self, Pieces):
+        if isinstance(self, PolynomialMotion):
             return self._build()
         files = _digests(self.files)
         with expecting(files):
@@ -336,7 +336,7 @@ class RecordMotion(MotionTable):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Arrays(MotionTable):
+class CsvMotion(MotionTable):
     """`Motion.from_csv`: a file with columns of time and displacement or acceleration, units in its header."""
 
     kind: ClassVar[str] = "arrays"
@@ -352,7 +352,7 @@ class Arrays(MotionTable):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pieces(MotionTable):
+class PolynomialMotion(MotionTable):
     """The polynomials of a `Motion`: the exact form in which a motion made in Python is written."""
 
     kind: ClassVar[str] = "pieces"
@@ -455,7 +455,7 @@ def _existing(file: str | None) -> Path:
 
 
 KINDS: dict[str, type[MotionTable]] = {
-    kind.kind: kind for kind in (Harmonic, Circle, FigureEight, Ramp, RecordMotion, Arrays, Pieces)
+    kind.kind: kind for kind in (Harmonic, Circle, FigureEight, Ramp, RecordMotion, CsvMotion, PolynomialMotion)
 }
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from msfp_gen.common.errors import InputError
-from msfp_gen.scene.file.changes import changed_table, keys_of
+from msfp_gen.scene.file.changes import changed_table, keys_of_path
 from msfp_gen.scene.file.loader import NO_PARTS, Parts, scene_from_table, scene_table
 from msfp_gen.scene.file.motion_tables import KINDS, paths_in, resolved, with_spectrum
 from msfp_gen.scene.file.schema import SCENE
@@ -80,7 +80,7 @@ def with_absolute_paths(table: Mapping[str, Any], folder: Path | None) -> dict[s
 
 def located_value(path: str, value: Any, folder: Path | None) -> Any:
     """A value of the field `path` with absolute paths of files; folder, errors: see `with_absolute_paths`."""
-    keys = keys_of(path)
+    keys = keys_of_path(path)
     nested: Any = value
     for key in reversed(keys):
         nested = {key: nested} if isinstance(key, str) else [nested]

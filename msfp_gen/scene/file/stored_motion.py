@@ -17,7 +17,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.common.fields import Notes
 from msfp_gen.motions.motion import CHANNELS, Motion
 from msfp_gen.scene.file.loader import bearing_scene_text
-from msfp_gen.scene.file.motion_tables import Pieces, motion_from
+from msfp_gen.scene.file.motion_tables import PolynomialMotion, motion_from
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,7 +42,7 @@ def scene_attribute(scene: Scene) -> str:
 def needs_pieces(scene: Scene) -> bool:
     """Whether the table alone cannot make the motion again: it names files, or Python code made the motion."""
     table = scene.motion_table
-    if table is None or table["kind"] == Pieces.kind or table.get("file") is not None:
+    if table is None or table["kind"] == PolynomialMotion.kind or table.get("file") is not None:
         return True
     return not _makes(table, scene.motion)
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import isfinite, nan
 from typing import Any
 
 import numpy as np
 
+from msfp_gen.common.aliases import Say
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.fields import Choice, ruled_fields
 from msfp_gen.common.tables import Table
 from msfp_gen.results.quantities import quantities
-from msfp_gen.results.verdict import Reading
+from msfp_gen.results.verdict import LimitReading
 from msfp_gen.scene.scene import effects_named
 from msfp_gen.scene.system import System
 from msfp_gen.simulation.simulate import simulate
@@ -26,11 +27,9 @@ TOLERANCE = "tolerance"  # in place of an effect, in the row of the numerical er
 TIGHTER = 0.1  # tolerance of the run that measures the numerical error, over the scene's tolerance
 REPEATS, LONG_ENOUGH = 3, 0.3  # runs, and the fastest is timed; one run alone if it takes so long [s]
 
-Say = Callable[[str], None]
-
 
 @dataclass(frozen=True)
-class Outcome:
+class EffectRun:
     """One run.
 
     values: of every quantity, an array of shape (m,) over m surfaces or floors in its SI unit, such as [m]; NaN where
@@ -38,7 +37,7 @@ class Outcome:
     """
 
     values: Mapping[str, Array]
-    limits: Mapping[str, Reading]
+    limits: Mapping[str, LimitReading]
     seconds: float
 
 
@@ -147,7 +146,7 @@ def effect_by_effect(system: System, say: Say = lambda _: None, only: Collection
     return EffectStudy(system.name, tuple(found), found[0].changes, undecided)
 
 
-def _run(system: System) -> tuple[Outcome, dict[str, Any]]:
+def _run(system: System) -> tuple[EffectRun, dict[str, Any]]:
     """The outcome of a system, and the effects that its run took in on the way: field -> value."""
     result = simulate(system)
     seconds = [float(result.summary["wall_time"])]
@@ -162,10 +161,10 @@ def _run(system: System) -> tuple[Outcome, dict[str, Any]]:
     values = {name: np.array(each) for name, each in columns.items() if np.isfinite(each).any()}
     ended = effects_named([result.provenance.get("model", "")])
     limits = {one.limit.name: one for one in result.verdict.worst.values()}
-    return Outcome(values, limits, min(seconds)), ended
+    return EffectRun(values, limits, min(seconds)), ended
 
 
-def _states(outcome: Outcome, noise: Mapping[str, float]) -> dict[str, str]:
+def _states(outcome: EffectRun, noise: Mapping[str, float]) -> dict[str, str]:
     """Limit -> within or exceeded, as the verdict has it, or undecided where it lies within the numerical error."""
     states = {}
     for name, one in outcome.limits.items():
@@ -175,7 +174,7 @@ def _states(outcome: Outcome, noise: Mapping[str, float]) -> dict[str, str]:
 
 
 def _change(
-    effect: str, before: str, after: str, base: Outcome, other: Outcome,
+    effect: str, before: str, after: str, base: EffectRun, other: EffectRun,
     states: Mapping[str, str], others: Mapping[str, str],
 ) -> EffectChange:  # fmt: skip
     """How another outcome differs from the system's."""

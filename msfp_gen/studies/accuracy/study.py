@@ -10,7 +10,7 @@ import json
 import os
 import platform
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import isfinite, nan
@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from msfp_gen.common.aliases import Say
 from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.common.output import make_folder, write_bytes
 from msfp_gen.common.tables import Table, write_rows
@@ -49,7 +50,6 @@ WRONG = 30.0  # RMS error over tolerance above which a success is wrong
 NEVER_WRONG, ALWAYS_WRONG = 1e-3, 0.1  # RMS error below which a success is never wrong, above which it always is
 FAMILIES = {name: method.family for name, method in METHODS.items()}
 KINDS = {"max": "maximum", "rms": "RMS"}  # of errors in tables and figures
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class ErrorStudy:
     """A study of one scene.
 
     Attributes:
@@ -117,7 +117,7 @@ def work_precision(
     tolerances: Sequence[float] = TOLERANCES,
     limit: float = LIMIT,
     say: Say = lambda line: None,
-) -> Study:
+) -> ErrorStudy:
     """Run `scene` by every method at every tolerance and measure the error of each run.
 
     Args:
@@ -142,7 +142,7 @@ def work_precision(
     trials = with_reruns(trials, confirming_reruns(scene, trials, limit, say))
     reference = best_reference([*trials, *tighter_runs(scene, trials, limit, say)], FAMILIES)
     points = tuple(point_of(trial.method, trial, reference) for trial in trials)
-    return Study(scene, "work-precision", points, reference, (*notes, *reference_notes(reference)))
+    return ErrorStudy(scene, "work-precision", points, reference, (*notes, *reference_notes(reference)))
 
 
 def model_errors(
@@ -151,7 +151,7 @@ def model_errors(
     tolerances: Sequence[float] = MODEL_TOLERANCES,
     limit: float = LIMIT,
     say: Say = lambda line: None,
-) -> Study:
+) -> ErrorStudy:
     """Error against cost of the given scene and of simplified models, against a reference run of the given scene.
 
     The error of a simplified model falls with its tolerance down to the error of the simplification. Arguments and
@@ -170,7 +170,7 @@ def model_errors(
         # The error of a simplified model may exceed its tolerance, which is no wrong success.
         points += [replace(point_of(variant.name, trial, reference), wrong=False) for trial in trials]
         notes += own_notes
-    return Study(scene, "model-error", tuple(points), reference, tuple(notes))
+    return ErrorStudy(scene, "model-error", tuple(points), reference, tuple(notes))
 
 
 def _variant_trials(
@@ -207,19 +207,9 @@ def check_settings(tolerances: Sequence[float], limit: float) -> None:
 
 
 def without_stop(system: Any) -> Any:
-    """The system with a duration up to its stop condition in place of this condition, which SciPy does not have.
-
-    All effects are modelled, so that no run changes its model. In a scene of one bearing uplift is modelled only where
-    `Auto` selects it at the start, since most methods have no uplift: a run in which a surface opens then fails.
-    """
-    complete = system.with_all_effects()
-    if "stop" not in system.__dataclass_fields__:
-        return complete
-    scene = system if complete is system else complete.with_effects(uplift=system.modelled.uplift)
-    if scene.stop is None:
-        return scene
-    end = float(simulate(replace(scene, output_step=None)).history.time[-1])
-    return replace(scene, stop=None, duration=end)
+    """The system with effects that no run changes, and with its duration in place of a stop, which SciPy lacks."""
+    scene = system.with_compared_effects()
+    return scene if scene.stop is None else replace(scene, stop=None, duration=float(simulate(scene).time[-1]))
 
 
 def run_tolerances(
@@ -341,7 +331,7 @@ def machine() -> dict[str, str]:
     return {name: value for name, value in about.items() if value}
 
 
-def rows(study: Study) -> list[dict[str, Any]]:
+def rows(study: ErrorStudy) -> list[dict[str, Any]]:
     """One dict of plain values for each point; None where a value is undefined."""
     return [
         {
@@ -355,7 +345,7 @@ def rows(study: Study) -> list[dict[str, Any]]:
     ]
 
 
-def as_dict(study: Study) -> dict[str, Any]:
+def as_dict(study: ErrorStudy) -> dict[str, Any]:
     """The study as plain data, ready for JSON."""
     reference = study.reference
     second, floor = reference.second, reference.floor
@@ -372,13 +362,13 @@ def as_dict(study: Study) -> dict[str, Any]:
     }
 
 
-def tables(study: Study) -> list[Table]:
+def tables(study: ErrorStudy) -> list[Table]:
     """The study as tables for the console."""
     notes = [("reference", reference_text(study)), *(("note", note) for note in study.notes)]
     return [_points(study), Table("reference of the errors, and notes", (), notes)]
 
 
-def _points(study: Study) -> Table:
+def _points(study: ErrorStudy) -> Table:
     cells = []
     for point in study.points:
         trial, known = point.trial, point.known_errors
@@ -389,7 +379,7 @@ def _points(study: Study) -> Table:
     return Table(f"{study.kind} of {study.scene.name or 'unnamed scene'}", (*HEADS, *study.shown.values()), cells)
 
 
-def reference_text(study: Study) -> str:
+def reference_text(study: ErrorStudy) -> str:
     """The reference and its confirming run in one line."""
     first, second, floor = study.reference.trial, study.reference.second, study.reference.floor
     text = f"{first.method} at {first.rtol:g}"
@@ -399,13 +389,13 @@ def reference_text(study: Study) -> str:
     return f"{text}, confirmed by {second.method} at {second.rtol:g}: they differ by {', '.join(parts)}"
 
 
-def markdown(study: Study) -> str:
+def markdown(study: ErrorStudy) -> str:
     """The table, the reference and the notes as Markdown."""
     notes = "".join(f"\n{note}.\n" for note in study.notes)
     return f"{_points(study).markdown}\nReference: {reference_text(study)}.\n{notes}"
 
 
-def figure_table(study: Study) -> dict[str, dict[str, list[float]]]:
+def figure_table(study: ErrorStudy) -> dict[str, dict[str, list[float]]]:
     """Series -> column -> values, as `plot_work_precision` draws them; without series that could not run."""
     table: dict[str, dict[str, list[float]]] = {}
     for series in study.series:
@@ -426,7 +416,7 @@ def figure_table(study: Study) -> dict[str, dict[str, list[float]]]:
     return table
 
 
-def draw(study: Study, path: str | Path) -> None:
+def draw(study: ErrorStudy, path: str | Path) -> None:
     """Draw the study to `path`: .png, .svg or .pdf."""
     from msfp_gen.figures import plot_work_precision
 
@@ -436,7 +426,7 @@ def draw(study: Study, path: str | Path) -> None:
     plot_work_precision(figure_table(study), path, errors=study.shown, floors=floors, title=title)
 
 
-def default_point(study: Study) -> Point | None:
+def default_point(study: ErrorStudy) -> Point | None:
     """The run of the scene's own method and tolerance; None where it is not in the study, or did not finish."""
     solver = study.scene.solver
     own = "as it stands" if study.kind == "model-error" else solver.method
@@ -444,7 +434,7 @@ def default_point(study: Study) -> Point | None:
     return points[0] if points else None
 
 
-def summary_line(study: Study) -> str:
+def summary_line(study: ErrorStudy) -> str:
     """What the scene's own tolerance gives and takes, in one sentence."""
     point, name = default_point(study), study.scene.name or "the scene"
     if point is None or point.errors is None:
@@ -453,7 +443,7 @@ def summary_line(study: Study) -> str:
     return f"{name}: {error} in {time} at its tolerance {point.trial.rtol:g}"
 
 
-def cost_table(study: Study) -> Table:
+def cost_table(study: ErrorStudy) -> Table:
     """Error against seconds of every run that ended, in four columns; the title says to what the errors are known."""
     floor = study.reference.floor
     known = "errors are not confirmed" if floor is None else f"errors are known to {_share(floor.worst_rms)}"
@@ -469,7 +459,7 @@ def cost_table(study: Study) -> Table:
     )
 
 
-def draw_summary(study: Study, path: str | Path) -> None:
+def draw_summary(study: ErrorStudy, path: str | Path) -> None:
     """Draw error against seconds in one panel, with the scene's own tolerance marked: .png, .svg or .pdf."""
     from msfp_gen.figures import plot_work_precision
 
@@ -494,7 +484,7 @@ def _words(quantity: str) -> str:
     return quantity.replace("_", " ")
 
 
-def _quantities(study: Study) -> str:
+def _quantities(study: ErrorStudy) -> str:
     *first, last = map(_words, study.reference.trial.histories)
     return f"{', '.join(first)} and {last}" if first else last
 
@@ -507,7 +497,7 @@ def _time(seconds: float) -> str:
     return f"{seconds:.2f} s" if seconds >= 0.1 else f"{1e3 * seconds:.2g} ms"
 
 
-def write(study: Study, folder: Path) -> list[Path]:
+def write(study: ErrorStudy, folder: Path) -> list[Path]:
     """Write CSV, JSON, Markdown and the figures as SVG and PNG to `folder`; returns the paths.
 
     The summary has one panel, error against seconds; the other figure has one for each kind of error and of cost.

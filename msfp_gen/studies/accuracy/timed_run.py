@@ -13,7 +13,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.scene.scene import Scene
-from msfp_gen.scene.system import System
+from msfp_gen.scene.system import System, require_field
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.batch import OUT_OF_TIME, run_to_end
 
@@ -246,8 +246,7 @@ def require_base_motion_only(system: System) -> Scene:
 
 def check_measurable(system: System) -> None:
     """Raise InputError for a system whose tolerance cannot be chosen."""
-    if "solver" not in system.__dataclass_fields__:
-        raise InputError(f"{system.name}: errors of this system cannot be measured, since it has no field solver")
+    require_field(system, "solver", "no error can be measured without it; use simulate alone")
 
 
 def run_native(name: str, system: System, rtol: float, limit: float, repeats: int = REPEATS) -> Trial:

@@ -38,7 +38,7 @@ FRACTILES = (0.16, 0.5, 0.84)
 POINTS = 50  # intensities of the fractiles, where the curves have different intensities
 MOST_CURVES = 400  # in a figure
 SCALE = "scale"  # axis of a study that scales the records
-Curve = tuple[Array, Array, Any]  # intensities, demands, and whether each run reached its end
+DemandCurve = tuple[Array, Array, Any]  # intensities, demands, and whether each run reached its end
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def _fractile(values: Array, share: float) -> Array:
     return np.asarray(values[ceil(count) - 1])
 
 
-def _common_intensities(curves: list[Curve], side: Side) -> Array:
+def _common_intensities(curves: list[DemandCurve], side: Side) -> Array:
     """The intensities of the fractiles: of the curves if equal in all, else a grid to the end of the shortest curve."""
     # A curve with a run that ended early counts as longer than any other.
     first = np.unique(curves[0][0])

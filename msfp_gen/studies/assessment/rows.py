@@ -98,7 +98,7 @@ def check_share(name: str, value: float) -> None:
         raise InputError(f"{name} = {value:g}: give a share between 0 and 1, such as 0.95")
 
 
-def numbers(rows: Any, name: str) -> Array:
+def column_numbers(rows: Any, name: str) -> Array:
     """A column as floats, shape (runs,) [its unit]; NaN: no value. Raises InputError: unknown column, or texts."""
     check_columns([name], rows.columns)
     try:
@@ -109,7 +109,7 @@ def numbers(rows: Any, name: str) -> Array:
 
 def intensities(rows: Any, name: str) -> Array:
     """A column of positive numbers, shape (runs,) [its unit]: an intensity measure. Raises InputError."""
-    values = numbers(rows, name)
+    values = column_numbers(rows, name)
     if not (values > 0).all():
         raise InputError(f"{name}: an intensity measure is above 0 in every run; give another column")
     return values
@@ -122,7 +122,7 @@ def demands(rows: Any, name: str) -> Array:
 
     Raises InputError where a run that reached its end has no value.
     """
-    values = numbers(rows, name)
+    values = column_numbers(rows, name)
     if count := int(np.isnan(values[complete(rows)]).sum()):
         raise InputError(f"{name}: {count} runs reached their end without a value; give another quantity")
     return np.where(np.isnan(values), np.inf if side_of(rows, name) == "least" else 0.0, values)

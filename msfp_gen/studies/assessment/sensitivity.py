@@ -14,9 +14,9 @@ from msfp_gen.figures.style import COLOURS, INK, THIN, headline, page
 from msfp_gen.studies.assessment.rows import (
     SIZE,
     STATISTICS,
+    column_numbers,
     complete,
     labelled,
-    numbers,
     read_study,
     scale_of,
     unit_of,
@@ -81,7 +81,7 @@ def by_sample(folder: str | Path, name: str, statistic: str, method: str) -> Any
         raise InputError(f"{str(folder)!r}: {len(rows)} of {table['about']['runs']} runs are done; complete the study")
     if early := int((~complete(rows)).sum()):
         raise InputError(f"{name}: {early} runs ended early; see their status and message, and narrow the axes")
-    y = numbers(rows, name)
+    y = column_numbers(rows, name)
     if np.isnan(y).any():
         raise InputError(f"{name}: {int(np.isnan(y).sum())} runs have no value; give another quantity")
     count = table["about"]["samples"]

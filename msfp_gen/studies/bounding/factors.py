@@ -21,7 +21,7 @@ from msfp_gen.scene.file.loader import toml_file, toml_table
 Pair = tuple[float, float]
 
 
-class Rule(NamedTuple):
+class CombinationRule(NamedTuple):
     """How a code combines factors.
 
     Attributes:
@@ -38,14 +38,16 @@ class Rule(NamedTuple):
 
 
 RULES = {
-    "asce7": Rule(False, 0.75, "lambda = (1 + a (product of environment - 1)) x product of direct", "give 0.75"),
-    "en1998-2": Rule(
+    "asce7": CombinationRule(
+        False, 0.75, "lambda = (1 + a (product of environment - 1)) x product of direct", "give 0.75"
+    ),
+    "en1998-2": CombinationRule(
         True,
         None,
         "lambda = product of (1 + psi (environment - 1)) x product of direct",
         "give psi: 0.90, 0.70 or 0.60 for importance class III, II or I",
     ),
-    "aashto": Rule(
+    "aashto": CombinationRule(
         True,
         None,
         "lambda = product of (1 + f_a (environment - 1)) x product of direct",

@@ -32,7 +32,7 @@ from msfp_gen.figures.style import (
     subscript,
 )
 from msfp_gen.results.characterise import Characterisation
-from msfp_gen.results.quantities import Source, quantities
+from msfp_gen.results.quantities import ColumnSource, quantities
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.scene.fidelity import check_stack
 from msfp_gen.scene.friction_parameters import proportional
@@ -69,13 +69,13 @@ class Case:
     characterisation: Characterisation | None
     failure: str = ""
 
-    def value(self, source: Source) -> float | None:
+    def value(self, source: ColumnSource) -> float | None:
         """The value of a quantity [SI]; None where the run failed or the quantity is undefined."""
         if self.result is None or self.characterisation is None:
             return None
         return source.value(self.result.entry, self.characterisation)  # type: ignore[no-any-return]
 
-    def place(self, source: Source) -> str:
+    def place(self, source: ColumnSource) -> str:
         """Where the value of a quantity is, and its share of what is allowed there; "" where it names no place."""
         where = source.quantity.where
         return str(getattr(self.characterisation, where)) if where and self.characterisation is not None else ""
@@ -116,7 +116,7 @@ class Bounds:
         return _typical(next(case for case in self.cases if case.name == "nominal").scene)
 
     @property
-    def compared(self) -> dict[str, Source]:
+    def compared(self) -> dict[str, ColumnSource]:
         """Column -> quantity that the cases are compared by; properties of loops are means over the cycles."""
         return {name: source for name, source in quantities(self.cases[0].scene).items() if source.compared}
 
@@ -289,7 +289,7 @@ def _typical(scene: System) -> Bearing:
 
 def _scaled(bearing: Bearing, field: str, factors: tuple[float, ...]) -> Bearing:
     """The bearing with a field of its surfaces multiplied by `factors`; unchanged if a surface has no such value."""
-    values: list[Any] = [getattr(surface, field, None) for surface in bearing.surfaces]
+    values: list[Any] = [getattr(surface, field) for surface in bearing.surfaces]
     if any(value is None for value in values):
         return bearing
     return bearing.replace(**{field: [value * factor for value, factor in zip(values, factors, strict=True)]})

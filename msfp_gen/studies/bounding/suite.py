@@ -22,8 +22,8 @@ from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.common.inputs import expecting
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, decimal_text, write_columns
-from msfp_gen.figures.style import INK, distinct, headline, page, plain
-from msfp_gen.results.quantities import MOVING, Source
+from msfp_gen.figures.style import INK, distinct_colours, headline, page, plain
+from msfp_gen.results.quantities import MOVING, ColumnSource
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.scene.plausibility import doubts, require_meant, target_doubts
 from msfp_gen.studies.batch import ENDED
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.system import System
     from msfp_gen.studies.definition import Study
 
-Run = tuple[str, str]  # names of a record and of a case
+RunKey = tuple[str, str]  # names of a record and of a case
 
 # Quantities of the figure, where the runs have them.
 DRAWN = ("peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "capacity_left")
@@ -103,11 +103,11 @@ class SuiteBounds:
     factors: str
     records: tuple[str, ...]
     left_out: tuple[str, ...]
-    sources: Mapping[str, Source]
+    sources: Mapping[str, ColumnSource]
     values: Mapping[str, Array]
-    failures: Mapping[Run, str]
-    exceeded: Mapping[Run, str]
-    stopped: Mapping[Run, float]
+    failures: Mapping[RunKey, str]
+    exceeded: Mapping[RunKey, str]
+    stopped: Mapping[RunKey, float]
 
     @cached_property
     def ended(self) -> Any:
@@ -332,7 +332,7 @@ def _from_rows(study: Study, folder: Path, leave_out: Collection[str]) -> SuiteB
 
     rows = read_study(folder)
     rows = rows[~rows["record"].isin(list(leave_out))]
-    runs: list[Run] = list(zip(rows["record"], rows["bounds"], strict=True))
+    runs: list[RunKey] = list(zip(rows["record"], rows["bounds"], strict=True))
     early = rows["status"].to_numpy() != "ok"
     sources = {name: source for name, source in study.keep.sources if name in rows and source.quantity.governs}
     values = {}
@@ -341,7 +341,7 @@ def _from_rows(study: Study, folder: Path, leave_out: Collection[str]) -> SuiteB
         until_then = source.quantity.side == source.quantity.governs  # more of the run can only make it worse
         values[name] = (column if until_then else np.where(early, np.nan, column)).reshape(-1, len(CASES))
 
-    def chosen(column: str, which: Iterable[bool]) -> dict[Run, Any]:
+    def chosen(column: str, which: Iterable[bool]) -> dict[RunKey, Any]:
         return {run: value for run, value, is_one in zip(runs, rows[column], which, strict=True) if is_one}
 
     failures = chosen("message", ~rows["status"].isin(ENDED))
@@ -458,7 +458,7 @@ def _words(message: str) -> str:
     return re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "", message)
 
 
-def _named(runs: Iterable[Run]) -> str:
+def _named(runs: Iterable[RunKey]) -> str:
     """Runs by the names of their records, each with its cases."""
     cases: dict[str, list[str]] = {}
     for record, case in runs:
@@ -513,7 +513,7 @@ def plot_suite_bounds(bounds: SuiteBounds, path: str | Path | None = None) -> Fi
     A cross marks a run that did not reach its end. Raises InputError for a path that cannot be written.
     """
     plotted = [name for name in DRAWN if name in bounds.values and not np.isnan(bounds.values[name]).all()]
-    colours = distinct(len(bounds.records))
+    colours = distinct_colours(len(bounds.records))
     rows = 1 + len(plotted) // IN_ROW
     with page(9.5, 0.6 + 2.7 * rows, path, "suite") as figure:
         headline(figure, f"{bounds.name or 'unnamed scene'}: {_counted(bounds)} at bounds by {bounds.factors}")

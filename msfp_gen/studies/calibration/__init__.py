@@ -3,8 +3,8 @@
 Measurements -> residuals of runs -> least squares (`fitting`) -> intervals -> `Fit`.
 """
 
-from msfp_gen.studies.calibration.fit_result import Estimate, Fit
+from msfp_gen.studies.calibration.fit_result import Fit, FittedValue
 from msfp_gen.studies.calibration.fitting import fit
 from msfp_gen.studies.calibration.measurement import FittedTest, Measurement, read_measurement
 
-__all__ = ["Estimate", "Fit", "FittedTest", "Measurement", "fit", "read_measurement"]
+__all__ = ["Fit", "FittedTest", "FittedValue", "Measurement", "fit", "read_measurement"]

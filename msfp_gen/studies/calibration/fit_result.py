@@ -44,7 +44,7 @@ SHOWN, LINES = 4, 10  # parameters and lines in the text of a fit, at most
 
 
 @dataclass(frozen=True)
-class Estimate:
+class FittedValue:
     """One fitted value.
 
     Attributes:
@@ -94,7 +94,7 @@ class Fit:
     """
 
     scene: Scene
-    estimates: tuple[Estimate, ...]
+    estimates: tuple[FittedValue, ...]
     correlation: Array
     condition: float
     tests: tuple[FittedTest, ...]
@@ -103,7 +103,7 @@ class Fit:
     evaluations: int
     rtol: float
 
-    def __getitem__(self, name: str) -> Estimate:
+    def __getitem__(self, name: str) -> FittedValue:
         """The estimate of a parameter, by its path. Raises KeyError."""
         return {estimate.name: estimate for estimate in self.estimates}[name]
 
@@ -189,7 +189,7 @@ def _plain(value: Any) -> Any:
 
 def fit_tables(fit: Fit) -> list[Table]:
     """Tables of estimates, correlations and tests, and of what limits the fit."""
-    tables = [estimate_table(fit)]
+    tables = [fitted_values_table(fit)]
     if len(fit.estimates) > 1:
         tables.append(correlation_table(fit))
     tables.append(residual_table(fit))
@@ -197,7 +197,7 @@ def fit_tables(fit: Fit) -> list[Table]:
     return [*tables, Table("what limits this fit", (), remarks)] if remarks else tables
 
 
-def estimate_table(fit: Fit) -> Table:
+def fitted_values_table(fit: Fit) -> Table:
     """Values, intervals and starts of the estimates."""
     rows = []
     for estimate in fit.estimates:

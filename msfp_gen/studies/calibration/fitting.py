@@ -18,13 +18,13 @@ from msfp_gen.common.aliases import FitProgress
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.errors import InputError, RunError
 from msfp_gen.scene.plausibility import require_meant
-from msfp_gen.studies.calibration.fit_result import Estimate, Fit
+from msfp_gen.studies.calibration.fit_result import Fit, FittedValue
 from msfp_gen.studies.calibration.intervals import Identified, Spread, identified, lag_one, noise_of, spread_of, weak
 from msfp_gen.studies.calibration.measurement import FittedTest, Measurement, read_measurement
 from msfp_gen.studies.calibration.residuals import (
-    Evaluation,
+    EvaluatedResiduals,
     Residuals,
-    changed_scene,
+    scene_at,
     scenes_of,
     unknowns_of,
 )
@@ -136,23 +136,23 @@ def _fit_of(scene: Scene, residuals: Residuals, solution: Solution, limits: tupl
     rows = zip(
         residuals.names, units, values.tolist(), starts, *columns, bounds, solution.at_bound.tolist(), strict=True
     )
-    estimates = tuple(Estimate(*row) for row in rows)
+    estimates = tuple(FittedValue(*row) for row in rows)
     tests = tuple(FittedTest(test, force) for test, force in zip(residuals.tests, solution.end.forces, strict=True))
     lines = weak(residuals.names[:size], values[:size], half[:size], solution.spread.correlation[:size, :size])
     return Fit(
-        scene=changed_scene(scene, residuals.unknowns, values[:size]),
+        scene=scene_at(scene, residuals.unknowns, values[:size]),
         estimates=estimates,
         correlation=solution.spread.correlation,
         condition=solution.known.condition,
         tests=tests,
         unidentified=(*solution.known.lines, *lines),
-        notes=(*_notes(estimates, tests, float(scene.top.stiffness)), *_error_notes(residuals, solution)),  # type: ignore[attr-defined]
+        notes=(*_notes(estimates, tests, float(scene.top.stiffness)), *_error_notes(residuals, solution)),
         evaluations=residuals.count,
         rtol=solution.rtol,
     )
 
 
-def _notes(estimates: Sequence[Estimate], tests: Sequence[FittedTest], stiffness: float) -> list[str]:
+def _notes(estimates: Sequence[FittedValue], tests: Sequence[FittedTest], stiffness: float) -> list[str]:
     """Lines on values at a bound and on tests in which the rig moves. stiffness: of the rig [N/m]."""
     bound = "is at its bound; its interval, and the intervals of the others, have no meaning"
     lines = [f"{estimate.name} {bound}" for estimate in estimates if estimate.at_bound]
@@ -216,7 +216,7 @@ class Solution:
     """
 
     x: Array
-    end: Evaluation
+    end: EvaluatedResiduals
     known: Identified
     spread: Spread
     at_bound: NDArray[np.bool_]
@@ -260,8 +260,8 @@ def solve(residuals: Residuals, start: Array, low: Array, high: Array, most: int
 
 
 def _steps(
-    residuals: Residuals, x: Array, at: Evaluation, free: NDArray[np.bool_], low: Array, high: Array
-) -> tuple[Array, Evaluation]:
+    residuals: Residuals, x: Array, at: EvaluatedResiduals, free: NDArray[np.bool_], low: Array, high: Array
+) -> tuple[Array, EvaluatedResiduals]:
     """Step from an evaluation at x, with its Jacobian, until a step is within the errors or reduces nothing."""
     # free: the unknowns that move. Returns the last x, and the evaluation there.
     for _ in range(STEPS):
@@ -275,7 +275,7 @@ def _steps(
     return x, at
 
 
-def _solution(residuals: Residuals, x: Array, end: Evaluation, low: Array, high: Array) -> Solution:
+def _solution(residuals: Residuals, x: Array, end: EvaluatedResiduals, low: Array, high: Array) -> Solution:
     """The solution at x from its evaluation `end`; the error of the runs is infinite, since it is not measured yet."""
     known = identified(end.jacobian, residuals.names)
     noises = noise_of(residuals.split(end.residuals), residuals.split(known.basis))
@@ -289,7 +289,9 @@ class _WithinError(Exception):
     """Ends the search: the next step is within the errors of the values."""
 
 
-def least_squares(residuals: Residuals, start: Array, low: Array, high: Array, most: int) -> tuple[Array, Evaluation]:
+def least_squares(
+    residuals: Residuals, start: Array, low: Array, high: Array, most: int
+) -> tuple[Array, EvaluatedResiduals]:
     """The unknowns between two bounds, shape (k,) [-], for which the sum of squares is least, and the evaluation there.
 
     The search also ends where the next step is shorter than a tenth of the standard errors: the noise of the tests

@@ -35,7 +35,9 @@ _OF_THE_TEST = {
     "load": "the tests have no load history",
     "initial_state": "a test starts at the centre of the bearing",
 }
-Run = tuple[Array, Array] | RunError | InputError  # force and its derivatives at the times of a test, or the error
+ForceOrError = (
+    tuple[Array, Array] | RunError | InputError
+)  # force and its derivatives at the times of a test, or the error
 TRAVEL = 1.5  # peak displacement of a test over the sum of all capacities, at most
 RATIOS = 1e-3, 5.0  # peak force of a test over the axial load, at least and at most
 FAILED = 10.0  # residual of a failed run, over the largest force: worse than any run, so that the step is refused
@@ -97,7 +99,7 @@ def unknowns_of(
     return tuple(unknowns)
 
 
-def changed_scene(scene: Scene, unknowns: Sequence[Unknown], values: Array) -> Scene:
+def scene_at(scene: Scene, unknowns: Sequence[Unknown], values: Array) -> Scene:
     """The scene with values of the unknowns, shape (k,). Raises InputError where a field does not accept its value."""
     pairs = zip(unknowns, values, strict=True)
     return changed_parameters(scene, {p: float(value) for unknown, value in pairs for p in unknown.members})
@@ -130,7 +132,7 @@ def _unknown(name: str, members: tuple[Parameter, ...], limits: tuple[float, flo
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
+class EvaluatedResiduals:
     """Runs of all tests at one set of values.
 
     residuals: weighted, over the largest force of all tests, shape (N,) [-]. jacobian: with respect to the unknowns
@@ -182,7 +184,7 @@ class Residuals:
     progress: FitProgress | None = None
     count: int = 0
     deviation: float = np.nan
-    _last: tuple[bytes, Evaluation] | None = None
+    _last: tuple[bytes, EvaluatedResiduals] | None = None
     _ways: Ways = field(default_factory=Ways)
 
     @property
@@ -216,14 +218,14 @@ class Residuals:
         """Number of offsets."""
         return len(self.tests) if self.with_offset else 0
 
-    def at(self, x: Array) -> Evaluation:
+    def at(self, x: Array) -> EvaluatedResiduals:
         """The evaluation at x. The last evaluation is cached, since an optimiser asks for its Jacobian afterwards."""
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = key, self.evaluate(x)
         return self._last[1]
 
-    def evaluate(self, x: Array, jacobian: Array | None = None) -> Evaluation:
+    def evaluate(self, x: Array, jacobian: Array | None = None) -> EvaluatedResiduals:
         """Run all tests at x. A given Jacobian, shape (N, k), is taken as it is, and the runs have no derivatives."""
         self.count += 1
         evaluation = self._evaluate(x * self.scale, jacobian)
@@ -235,12 +237,12 @@ class Residuals:
         """Rows of all tests, shape (N, ...), split into the rows of each test, shape (T, ...) [unit of `rows`]."""
         return np.split(rows, np.cumsum([len(test.time) for test in self.tests])[:-1])
 
-    def _evaluate(self, values: Array, jacobian: Array | None) -> Evaluation:
+    def _evaluate(self, values: Array, jacobian: Array | None) -> EvaluatedResiduals:
         size, forces, residuals, blocks = len(self.unknowns), [], [], []
         for index, (test, run) in enumerate(zip(self.tests, self._runs(values[:size], jacobian is None), strict=True)):
             if isinstance(run, RunError | InputError):
                 rows = sum(len(other.time) for other in self.tests)
-                return Evaluation(np.full(rows, FAILED), np.zeros((rows, len(values))), (), run)
+                return EvaluatedResiduals(np.full(rows, FAILED), np.zeros((rows, len(values))), (), run)
             force, slopes = run
             shift = np.zeros((len(force), self.offsets))
             if self.with_offset:
@@ -251,9 +253,9 @@ class Residuals:
             if jacobian is None:
                 blocks.append(test.weight * np.column_stack([slopes, shift]) * self.scale / self.largest)
         jacobian = np.concatenate(blocks) if jacobian is None else jacobian
-        return Evaluation(np.concatenate(residuals), jacobian, tuple(forces))
+        return EvaluatedResiduals(np.concatenate(residuals), jacobian, tuple(forces))
 
-    def _runs(self, values: Array, slopes: bool) -> list[Run]:
+    def _runs(self, values: Array, slopes: bool) -> list[ForceOrError]:
         """Run all tests at the same time; a run that fails gives its error. slopes: whether with derivatives."""
         for spec in dict.fromkeys(scene.spec for scene in self.scenes):
             build_model(spec.layout, spec.effects, gradients=slopes)
@@ -270,12 +272,12 @@ class Residuals:
             self.progress(self.count, share, self.deviation)
 
 
-def _run(test: Measurement, scene: Scene, unknowns: Sequence[Unknown], values: Array, slopes: bool) -> Run:
+def _run(test: Measurement, scene: Scene, unknowns: Sequence[Unknown], values: Array, slopes: bool) -> ForceOrError:
     """Force of a run at the times of its test, shape (T,) [N], and its derivatives, shape (T, k) or (T, 0)."""
     paths = [member.path for unknown in unknowns for member in unknown.members]
     try:
         result = simulate(
-            changed_scene(scene, unknowns, values),
+            scene_at(scene, unknowns, values),
             gradients=paths if slopes else (),
             gradient_errors=False,
             progress=proceed,

@@ -1,6 +1,6 @@
 """`estimate`: a mean of a study, or a probability of exceedance, from cheap and exact runs.
 
-A study and a question come in; rounds of runs (`source.py`) are planned until the interval (`estimators.py`) is narrow
+A study and a question come in; rounds of runs (`model_runs.py`) are planned until the interval (`estimators.py`) is
 enough; an `Estimate` goes out. Its table for a terminal and its figure are here too.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Annotated, Any
@@ -33,7 +33,7 @@ from msfp_gen.studies.estimation.estimators import (
     optimal_runs,
     work,
 )
-from msfp_gen.studies.estimation.source import Source, StudySource
+from msfp_gen.studies.estimation.model_runs import ModelRuns, StudyModelRuns
 from msfp_gen.studies.workers import pool_from
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ class Estimate:
 def question_of(study: Study, **changes: Any) -> Question:
     """The question of `[accuracy]` in a study file; changes other than None replace its keys. Raises InputError."""
     table = {key: value for key, value in study.table.get("accuracy", {}).items() if key != "draws"}
-    known = [name for name in Question.__dataclass_fields__ if name != "side"]
+    known = [field.name for field in fields(Question) if field.name != "side"]
     if unknown := [key for key in table if key not in known]:
         raise InputError(f"accuracy.{unknown[0]}: no such key; the keys are {', '.join(known)}")
     goals = ("target", "budget")
@@ -207,7 +207,7 @@ def estimate(
     existed = Path(folder).exists()
     try:
         with pool_from(workers, executor, dask) as pool:
-            runs = StudySource(study, Path(folder), question.quantity, levels, question.seed, pool, progress)
+            runs = StudyModelRuns(study, Path(folder), question.quantity, levels, question.seed, pool, progress)
             result = estimated(runs, replace(question, side=study.keep.side(question.quantity)))
     except _BudgetError:
         if not existed:
@@ -234,7 +234,7 @@ class _State:
     # exact, many: numbers of runs of the exact and of the cheap model.
     # early: model -> runs that ended early.
 
-    def __init__(self, source: Source, question: Question) -> None:
+    def __init__(self, source: ModelRuns, question: Question) -> None:
         self.source, self.question = source, question
         self.limit = min(MOST, source.population or MOST)
         self.exact = min(question.pilot, CHOICE, self.limit)
@@ -321,7 +321,7 @@ def _finite(values: Array) -> Array:
     return np.where(np.isfinite(values), values, float(finite.max()) if len(finite) else 0.0)
 
 
-def estimated(source: Source, question: Question) -> Estimate:
+def estimated(source: ModelRuns, question: Question) -> Estimate:
     """The estimate of a statistic from a source of runs. Raises InputError."""
     state, notes = _State(source, question), []
     correlation = _choose(state)

@@ -11,7 +11,8 @@ from support.audits import WEIGHT, rows_of, shaken, with_columns, with_force
 
 from msfp_gen import InputError, audit
 from msfp_gen.auditing import Histories
-from msfp_gen.auditing.checks import CHECKS, CONSISTENT, INCONSISTENT, OPEN, AuditCase
+from msfp_gen.auditing.case import CONSISTENT, INCONSISTENT, OPEN, AuditCase
+from msfp_gen.auditing.checks import CHECKS
 from msfp_gen.auditing.corrections import corrected
 from msfp_gen.auditing.stated import stated_of
 
@@ -138,6 +139,69 @@ def test_the_sentence_of_energy_states_what_is_permitted():
         pushed = np.where(pushing & (TIME < 13.0), 1.0, 0.0)[:, None] * np.sign(data.velocity) * -reach
         found = finding(with_force(data, 1.0 - 1.0 * (pushed[:, 0] != 0), pushed), "energy")
         assert found.verdict == verdict, found.sentence
+
+
+def parting(pull=0.0, rows=1):
+    """The pendulum, which parts for 0.1 s of every second after two seconds, and pulls for some rows of each [N]."""
+    data = pendulum()
+    phase = np.round(100 * (TIME % 1.0)).astype(int)
+    share = np.where((TIME > 2.0) & (phase < 10), 0.0, 1.0)
+    share = np.where((TIME > 2.0) & (phase >= 10), 10.0 / 9.0, share)  # the mean remains
+    pulls = (TIME > 2.0) & (phase >= 3) & (phase < 3 + rows)
+    return with_columns(with_force(data, share), axial=WEIGHT * share - pull * pulls)
+
+
+def test_a_plate_that_hangs_on_its_support_pulls_for_a_moment():
+    plate = SCENE.bearing.bodies[-1].mass * SCENE.bearing.gravity
+    assert finding(parting(), "tension").verdict == CONSISTENT
+    assert finding(parting(8.0 * plate, 1), "tension").verdict == OPEN
+    held = finding(parting(8.0 * plate + 0.01 * WEIGHT, 8), "tension")
+    assert held.verdict == INCONSISTENT and "would have opened" in held.sentence
+
+
+def test_a_rim_that_is_inclined_pulls():
+    """By the slope of its dish at most: more is tension of the bearing."""
+    for ratio, verdict in ((1.1, OPEN), (0.5, INCONSISTENT)):
+        data = parting(0.05 * WEIGHT, 6)
+        side = np.where(data.axial < 0, ratio * 0.05 * WEIGHT / STATED.steepest, 0.0)
+        assert finding(with_force(data, 1.0, np.column_stack([side, 0 * side])), "tension").verdict == verdict
+
+
+def test_what_parted_surfaces_leave_open():
+    """Loads whose mean misses impacts, travel beyond rims, coarse rows: each is inconsistent of a closed bearing."""
+    data = parting()
+    assert finding(data, "weight").verdict == CONSISTENT and finding(data, "weight").value == pytest.approx(1, abs=0.01)
+    short = with_columns(data, axial=np.where(data.axial > WEIGHT, 0.9, 1.0) * data.axial)
+    assert finding(short, "weight").verdict == OPEN and "before the motion" in finding(short, "weight").sentence
+    far = 1.2 * STATED.capacity / np.abs(data.displacement).max()
+    for name, check in ((data.scaled({"displacement_1": far}), "travel"), (rows_of(data, 25), "sampling")):
+        assert finding(name, check).verdict == OPEN
+        closed = with_columns(name, axial=WEIGHT + 0 * name.time)
+        assert finding(closed, check).verdict == INCONSISTENT
+
+
+def test_the_coefficient_is_stated_by_speed_axial_force_and_time():
+    """Friction that falls with the axial force and over time: medians of thirds of the rows, beside the law."""
+    data = pendulum()
+    axial = WEIGHT * (1.0 + 0.3 * np.sin(0.7 * TIME))
+    share = (WEIGHT / axial) ** 0.5 * (1.0 - 0.02 * TIME)
+    friction = STATED.friction * share * np.tanh(data.velocity[:, 0] / 0.005)
+    force = axial * (data.displacement[:, 0] / STATED.radius + friction)
+    found = audit(with_columns(data, axial=axial, force_1=force), SCENE)
+    names = ("speed", "axial force", "time")
+    by = {name: [one for one in found.coefficients if one.quantity == name] for name in names}
+    assert all(len(ranges) == 3 for ranges in by.values())
+    for one in by["axial force"]:
+        assert one.law == pytest.approx(STATED.friction, rel=1e-3) and one.least <= one.median <= one.most
+    low, _, high = by["axial force"]
+    assert low.high < WEIGHT < high.low and low.median > 1.15 * high.median
+    first, _, last = by["time"]
+    assert first.median > 1.05 * last.median and last.high > 19.0
+    assert len(found.as_dict["coefficients"]) == 9 and found.tables[1].rows[3][0] == "axial force"
+    assert [figure.check for figure in found.figures] == ["by_speed", "by_axial force", "by_time"]
+    even = audit(data, SCENE)
+    assert {one.quantity for one in even.coefficients} == {"speed", "time"}  # its axial force is constant
+    assert audit(without(data, "axial"), SCENE).coefficients == ()
 
 
 def test_a_map_is_for_a_file():

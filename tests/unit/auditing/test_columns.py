@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from msfp_gen import InputError, load_scene, simulate
+from msfp_gen import InputError, load_scene, simulate, using_sign
 from msfp_gen.auditing import read_histories
 from msfp_gen.auditing.histories import histories_of
 from msfp_gen.results.files import save
@@ -56,10 +56,11 @@ def test_recorders_without_a_header(tmp_path):
 ROTATIONS = [f"{end}_rotation_{axis}" for end in ("lower", "upper") for axis in (1, 2)]
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".nc"])
-def test_results_of_this_package_need_no_map(tmp_path, suffix):
+@pytest.mark.parametrize(("suffix", "sign"), [(".csv", "base-top"), (".csv", "top-base"), (".nc", "base-top")])
+def test_results_of_this_package_need_no_map(tmp_path, suffix, sign):
     result = simulate(load_scene("fenz-test2"))
-    found = read_histories(save(result, tmp_path / f"run{suffix}"))
+    with using_sign(sign):
+        found = read_histories(save(result, tmp_path / f"run{suffix}"))
     own = histories_of(result)
     assert own.columns.keys() - found.columns.keys() == ({*ROTATIONS} if suffix == ".csv" else set())
     for name, values in found.columns.items():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Motion, Top, load_scene, presets, simulate
-from msfp_gen.buildings.scene import remaining_loads
+from msfp_gen.buildings.effects import remaining_loads
 
 BEARING = presets.bearing("fenz-tfp")
 

@@ -11,7 +11,7 @@ from support.buildings import BEARING, extremes_of_rows, frame, scene
 from msfp_gen import Motion, Solver, simulate
 from msfp_gen.buildings import run as building_run
 from msfp_gen.buildings.extremes import DIMENSIONS
-from msfp_gen.buildings.run import start_run, unpacked
+from msfp_gen.buildings.run import start_building_run, unpacked
 from msfp_gen.results.geometry import contact_offsets
 from msfp_gen.results.result import load_result
 
@@ -81,7 +81,7 @@ def test_rims_push_with_their_stiffness():
 def test_places_of_contacts_are_those_of_the_rows(monkeypatch: pytest.MonkeyPatch):
     """The compiled sine against the positions of contacts by `contact_offsets`, which drawings use."""
     monkeypatch.setattr(building_run, "KEPT", (*building_run.KEPT, "angles", "q"))
-    run = start_run(scene(frame(), duration=0.8, solver=Solver(max_step=1e-3), output_step=1e-3))
+    run = start_building_run(scene(frame(), duration=0.8, solver=Solver(max_step=1e-3), output_step=1e-3))
     while run.run.advance(1000):
         pass
     rows, extremes = unpacked(run), run.extremes

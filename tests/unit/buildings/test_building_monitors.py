@@ -9,10 +9,10 @@ import pytest
 from support.buildings import BEARING, LOAD, rocking
 
 from msfp_gen import Auto, Effects, RunError, bound, simulate
-from msfp_gen.buildings import scene as selection
+from msfp_gen.buildings import effects as selection
 from msfp_gen.buildings.extremes import DIMENSIONS
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.run import start_run
+from msfp_gen.buildings.run import start_building_run
 from msfp_gen.results.result import load_result
 from msfp_gen.scene import effect_switching
 from msfp_gen.scene.scene import effects_named
@@ -56,7 +56,7 @@ def test_a_run_is_resumed_bit_by_bit_before_and_after_a_switch(tmp_path):
 
 @pytest.mark.usefixtures("unforeseen")
 def test_no_axial_force_jumps_where_uplift_opens():
-    run = start_run(rocking(None))
+    run = start_building_run(rocking(None))
     while run.run.advance(1000):
         pass
     old, time = run.members[2], run.time
@@ -137,7 +137,7 @@ def test_fixed_effects_are_noted_and_end_the_run_with_the_name_of_the_bearing(fi
 def test_notes_of_heat_give_the_peak_over_all_models_of_a_bearing(monkeypatch):
     """Two of the bearings change their model after the limit of heat, here a hundredth of the usual one, is passed."""
     monkeypatch.setattr(effect_switching, "NOTED_SOFTENING", 5e-4)
-    run, highest = start_run(rocking(None)), np.zeros(4)
+    run, highest = start_building_run(rocking(None)), np.zeros(4)
     while run.run.advance(10) or run.switch():
         parts = [RestartState.of_port(member.port).monitor_heat for member in run.members]
         highest = np.maximum(highest, [each.sum(axis=1).max() for each in parts])
@@ -152,7 +152,7 @@ def test_notes_of_heat_give_the_peak_over_all_models_of_a_bearing(monkeypatch):
 
 
 def test_a_damaged_change_of_models_is_refused():
-    run = start_run(rocking(None))
+    run = start_building_run(rocking(None))
     table = {"bearing": 7, "effects": {}, "rows": 1, "work": [], "build": "", "notes": []}
     for change in ({**table}, {**table, "bearing": 1}):
         with pytest.raises(ValueError, match=r"change of models of no bearing|another build"):
@@ -160,7 +160,7 @@ def test_a_damaged_change_of_models_is_refused():
 
 
 def test_a_state_that_no_bearing_has_is_not_entered():
-    rest = start_run(rocking(None)).members[0]
+    rest = start_building_run(rocking(None)).members[0]
     q, ends = np.zeros((4, 3)), np.zeros((2, 3, 6))
     assert rest.port.enter(1.0, q, q, np.zeros((4, 2)), ends) == "ok" and rest.port.time == 1.0
     assert rest.port.enter(1.0, q * np.nan, q, np.zeros((4, 2)), ends) == "argument"

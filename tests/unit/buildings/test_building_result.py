@@ -11,23 +11,20 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from support import ROOT, preset_run
+from support import ROOT
 from support.buildings import MOTION, PLACES, pushed, pushed_scene
 from support.synthetic import loops as loops_of_one
 from support.synthetic import opened
 
-from msfp_gen import Effects, InputError, Result, RunError, Solver, changed_scene, characterise, simulate
+from msfp_gen import Effects, InputError, Result, changed_scene, characterise, simulate
 from msfp_gen.buildings.explain import explain
 from msfp_gen.buildings.notes import shared
-from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import FIGURES, animate, figures_of
 from msfp_gen.report import write_report
 from msfp_gen.results.characterise import characterised, csv_rows
-from msfp_gen.results.files import table_of
 from msfp_gen.results.history import ENERGY_BELOW
 from msfp_gen.results.loops import ForcePath as Motions
 from msfp_gen.results.note import Note
-from msfp_gen.results.quantities import quantities
 from msfp_gen.results.result import load_result
 from msfp_gen.results.summary import summary_of_bearing
 from msfp_gen.scene.fidelity import Backbone, at_fidelity
@@ -126,17 +123,6 @@ def test_a_file_without_extremes_is_refused(tmp_path: Path):
         load_result(path)
 
 
-def test_columns_of_a_scene_are_those_of_its_pushed():
-    """In order, and with the same values; of a bearing those of the effects that are modelled."""
-    for run in (pushed(), loops_of_one()):
-        storage, exported = run.storage, {column.name: column.values for column in table_of(run.dataset)}
-        columns, arrays = storage.columns(run.scene), storage.arrays_of(run)
-        assert list(exported) == [name for name, (variable, _) in columns.items() if variable.field in arrays]
-        for name, values in exported.items():
-            variable, index = columns[name]
-            assert np.array_equal(values, variable.of(arrays)[:, *index])
-
-
 def test_torsion_of_the_base_is_that_of_the_masses():
     """Its moment about the centre of mass is what turns the building."""
     building, found = pushed_scene().building, pushed()
@@ -187,12 +173,6 @@ def test_dataset_states_signs_and_is_addressed_by_names():
     assert np.array_equal(top, pushed().node("floor 3")[:, 2, 0])
 
 
-def test_the_scene_of_a_file_runs_again(tmp_path: Path):
-    read = load_result(pushed().to_netcdf(tmp_path / "frame.nc"))
-    assert read.scene.modelled == pushed_scene().modelled and read.scene.motion == pushed_scene().motion
-    assert np.array_equal(simulate(read.scene).wrench, pushed().wrench)
-
-
 @pytest.mark.slow  # a layout of its own with plates that turn
 def test_bearings_of_other_layouts_have_no_values_where_they_have_no_surface():
     from msfp_gen import presets
@@ -203,14 +183,6 @@ def test_bearings_of_other_layouts_have_no_values_where_they_have_no_surface():
     values = found.dataset["sliding"].to_numpy()
     assert np.isfinite(values[:, 0, :2]).all() and np.isnan(values[:, 0, 2:]).all() and np.isfinite(values[:, 1:]).all()
     assert len(found.bearings[0].summary["peak_sliding"]) == 2
-
-
-def test_a_failed_run_states_how_it_ended():
-    with pytest.raises(RunError) as caught:
-        simulate(replace(pushed_scene(), solver=Solver(max_steps=3)))
-    found = caught.value.result
-    assert isinstance(found, BuildingResult) and found.status == "steps" and found.message == str(caught.value)
-    assert "steps" in repr(found)
 
 
 @pytest.mark.parametrize("kind", ["heat", "inertia"])
@@ -341,18 +313,6 @@ def test_bearings_of_a_building_at_other_times_keep_their_displacement():
     for one, then in zip(building.bearings, shown.bearings, strict=True):
         assert then.history.displacement == pytest.approx(one.history.displacement[rows], abs=1e-15)
         assert np.abs(then.history.displacement[0]).max() > 1e-4
-
-
-def test_every_quantity_of_the_catalogue_is_in_a_pushed():
-    cycles = preset_run("fenz-test2").characterise().envelope
-    for run in (preset_run("fenz-test2"), pushed()):
-        characterisation = replace(run.characterise(), envelope=cycles)  # the building moves for less than a cycle
-        sources = quantities(run.scene)
-        values = {name: source.value(run.entry, characterisation) for name, source in sources.items()}
-        missing = {name.rstrip("_1234") for name, value in values.items() if value is None}
-        # no friction law, no uplift; and both runs end in motion
-        optional = {"least_friction", "most_friction", "peak_temperature", "maximum_uplift", "residual_displacement"}
-        assert missing <= optional and values["peak_force"] == characterisation.peak_force
 
 
 def test_a_doubt_about_a_shared_bearing_is_one_note() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from msfp_gen import Auto, BuildingScene, Effects, InputError, bound, changed_scene, simulate, simulate_batch, study
+from msfp_gen import Auto, BuildingScene, Effects, InputError, bound, changed_scene, simulate, study
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.cli import main
 from msfp_gen.results.result import load_result
@@ -106,14 +106,6 @@ def test_bearings_of_bounds_may_take_uplift_in_on_the_way():
         assert all(asked) and {effects.friction for effects in case.modelled} == {"pvt"}
     given = replace(scene, bearings=[replace(one, effects=Effects()) for one in scene.bearings])
     assert all(case.modelled == given.modelled for case in bounded_scenes(given, load_factors("asce7")).values())
-
-
-def test_a_batch_gives_the_results_of_simulate(path: Path):
-    scenes = [changed_scene(path, {FRICTION: value}) for value in (0.02, 0.06)]
-    results = simulate_batch(scenes, workers=2)
-    for scene, result in zip(scenes, results, strict=True):
-        assert isinstance(result, BuildingResult) and result.scene is scene
-    assert np.array_equal(results[1].wrench, alone(path.parent, 0.06).wrench)
 
 
 @pytest.mark.slow

@@ -34,7 +34,7 @@ from msfp_gen.embedding.library import export_library
 from msfp_gen.generator.interface import ABI_VERSION, model_name
 from msfp_gen.jit.compiler import find_compiler
 from msfp_gen.jit.library import BuiltLibrary, Platform, build_library, find_platform
-from msfp_gen.simulation.start import start_run
+from msfp_gen.simulation.start import start_compiled_run
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import ModelSpec
 
@@ -175,7 +175,7 @@ def test_rows_are_those_of_python_bit_by_bit(prefix: Path, tmp_path: Path) -> No
 def python_run(scene: Scene) -> Any:
     """The compiled run of a scene, at its end."""
     model = build_model(scene.bearing.layout, scene.effects)
-    run, _ = start_run(scene, model, scene.effect_selection, scene.end, None, ())
+    run, _ = start_compiled_run(scene, model, scene.effect_selection, scene.end, None, ())
     while run.advance():
         pass
     return run

@@ -20,7 +20,7 @@ from support.replay import REPLAY, inputs
 from msfp_gen import Effects, Scene, build_model, cli, load_scene
 from msfp_gen.common.errors import CompileError
 from msfp_gen.jit import library as platforms
-from msfp_gen.simulation.start import start_run
+from msfp_gen.simulation.start import start_compiled_run
 
 LAYOUT = ("5", "2", "2", "--dimension", "planar")  # half of the compiling of a spatial model
 FLAGS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
@@ -63,7 +63,7 @@ def compare(output: str, scene: Scene) -> None:
     """Rows that replay.c printed with those of Python, bit by bit."""
     *lines, steps, status = output.splitlines()
     model = build_model(scene.bearing.layout, scene.effects)
-    run, _ = start_run(scene, model, scene.effect_selection, scene.end, None, ())
+    run, _ = start_compiled_run(scene, model, scene.effect_selection, scene.end, None, ())
     while run.advance():
         pass
     rows = np.array([[float(word) for word in line.split()] for line in lines])

@@ -13,7 +13,7 @@ from support import ROOT, fake_model
 
 from msfp_gen.common.errors import CompileError, InputError
 from msfp_gen.jit import build, cache, compiler, doctor
-from msfp_gen.jit.compiler import FORBIDDEN, words
+from msfp_gen.jit.compiler import FORBIDDEN, words_of_variable
 from msfp_gen.specification.layout import Layout, ModelSpec
 
 SPEC = ModelSpec(Layout.dfp())
@@ -48,7 +48,7 @@ def test_flags_that_remove_the_checks_of_numbers_are_refused(flag: str, monkeypa
 
 def test_safe_flags_are_words_as_of_a_shell(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MSFP_GEN_CFLAGS", " -O3  '-DA=b c' ")
-    assert words("MSFP_GEN_CFLAGS") == ("-O3", "-DA=b c")
+    assert words_of_variable("MSFP_GEN_CFLAGS") == ("-O3", "-DA=b c")
 
 
 def test_a_command_says_it_in_one_line() -> None:

@@ -17,7 +17,7 @@ from support.buildings import BEARING, INTERFACE, frame, pushed, pushed_scene, s
 
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, Motion, RunError, Storey, simulate
 from msfp_gen.buildings.figures import FIGURES as BUILDING_FIGURES
-from msfp_gen.buildings.page import PAGE, building_view, scale_of
+from msfp_gen.buildings.page import PAGE, building_view, magnification
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.report import TitleBlock, report_html
 
@@ -49,7 +49,7 @@ def test_the_view_holds_the_motion_of_the_frame():
     assert data["frames"]["node"]["shape"] == [len(result().time), 4, 6] and data["plates"]
     assert json.dumps(data, allow_nan=False)
     mean = np.mean([np.hypot(*each.history.displacement[:, :2].T) for each in result().bearings], axis=0)
-    assert data["peak"] == int(mean.argmax()) and data["scale"] == scale_of(result()) >= 1
+    assert data["peak"] == int(mean.argmax()) and data["scale"] == magnification(result()) >= 1
     assert data["places"][1] == [-3.0, 2.0, 0.0] and data["loads"] == result().scene.axial_loads.tolist()
 
 

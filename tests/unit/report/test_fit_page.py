@@ -12,7 +12,7 @@ from support import scene_of
 
 from msfp_gen import InputError
 from msfp_gen.report import fit_html, write_fit_report
-from msfp_gen.studies.calibration import Estimate, Fit, FittedTest, Measurement
+from msfp_gen.studies.calibration import Fit, FittedTest, FittedValue, Measurement
 from msfp_gen.studies.calibration.fit_result import ACROSS, DRAWN, plot_fit, plot_residuals
 
 RNG = np.random.default_rng(0)
@@ -27,9 +27,9 @@ def fitted(name: str, load: float | None = None) -> FittedTest:
 
 def made(tests: list[FittedTest], **changes: object) -> Fit:
     estimates = (
-        Estimate("bearing.surfaces[0].friction", "", 0.03, 0.04, 0.001, 0.028, 0.032, 5e-5, (0.004, 0.4)),
-        Estimate("bearing.surfaces[0].radius", "m", 0.47, 0.473, np.inf, -np.inf, np.inf, np.inf, (0.1, 1.0)),
-        Estimate("offset of a.csv", "N", 12.5, 0.0, 3.0, 6.5, 18.5, 0.5),
+        FittedValue("bearing.surfaces[0].friction", "", 0.03, 0.04, 0.001, 0.028, 0.032, 5e-5, (0.004, 0.4)),
+        FittedValue("bearing.surfaces[0].radius", "m", 0.47, 0.473, np.inf, -np.inf, np.inf, np.inf, (0.1, 1.0)),
+        FittedValue("offset of a.csv", "N", 12.5, 0.0, 3.0, 6.5, 18.5, 0.5),
     )
     correlation = np.array([[1.0, np.nan, 0.25], [np.nan, np.nan, np.nan], [0.25, np.nan, 1.0]])
     found = Fit(scene_of("fenz-test2"), estimates, correlation, 12.5, tuple(tests), (), (), 7, 1e-6)

@@ -14,7 +14,7 @@ from support.synthetic import LOAD, history, loops, opened, ramp, scene
 
 from msfp_gen import Load, load_scene, simulate
 from msfp_gen.common.errors import InputError
-from msfp_gen.results.history import ENERGY, Counters, quantities
+from msfp_gen.results.history import ENERGY, Counters, row_fields
 from msfp_gen.results.result import Result, load_result
 from msfp_gen.results.summary import energy_balance
 from msfp_gen.scene.top import Top
@@ -36,7 +36,7 @@ def test_every_variable_has_unit_and_meaning(run):
 def test_dataset_has_every_quantity():
     result = loops()
     dataset = result.dataset
-    names = {name for field in result.history.arrays() for name in quantities()[field].names or (field,)} - {"time"}
+    names = {name for field in result.history.arrays() for name in row_fields()[field].names or (field,)} - {"time"}
     assert names | {f"energy_{name}" for name in ENERGY} <= set(dataset.data_vars)
     assert dataset.sizes == {
         "time": 2001,

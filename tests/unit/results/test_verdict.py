@@ -36,7 +36,7 @@ from msfp_gen.results.history import Event
 from msfp_gen.results.note import Note
 from msfp_gen.results.result import load_result
 from msfp_gen.results.sliding import intervals, merged, openings
-from msfp_gen.results.verdict import LIMITS, RIM_SHARE, Reading, Value
+from msfp_gen.results.verdict import LIMITS, RIM_SHARE, LimitReading, ReachedValue
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.plausibility import scene_doubts
 
@@ -208,7 +208,7 @@ def test_a_peak_that_no_row_has_keeps_its_time() -> None:
     assert f"{known.time:.4g} s" in judged(quiet, rim_force=1.0).text
     note = Note(0.28, "heat", 4, 240.0, "", value_time=1.5)
     hot = replace(preset_run("fenz-test2"), notes=(note,)).verdict.worst["temperature"]
-    assert hot.value == Value(4, 1.5, 260.0, 250.0)
+    assert hot.value == ReachedValue(4, 1.5, 260.0, 250.0)
     beyond = Note(0.28, "rims", 1, 0.02, "", value_time=0.9)
     assert replace(preset_run("fenz-test5"), notes=(beyond,)).verdict.worst["beyond_rim"].value.time == 0.9
 
@@ -223,7 +223,7 @@ def test_rims_at_one_time_do_not_depend_on_the_rows() -> None:
 
 def test_what_equals_its_limit_up_to_rounding_is_within() -> None:
     """Ten rows of 10 ms are 0.1 s."""
-    reading = Reading(LIMITS[0], 0, "", Value(1, 0.0, 0.1 * (1 + 1e-12), 0.1))
+    reading = LimitReading(LIMITS[0], 0, "", ReachedValue(1, 0.0, 0.1 * (1 + 1e-12), 0.1))
     assert not reading.exceeded and replace(reading, value=reading.value._replace(reached=0.1 + 1e-9)).exceeded
 
 
@@ -523,6 +523,6 @@ def test_explain_has_the_limits_that_are_given(given: Scene | BuildingScene) -> 
 
 
 def test_what_a_limit_of_zero_does_not_allow_governs() -> None:
-    value = Value(1, 0.0, 0.0, 0.0)
-    shares = [Reading(LIMITS[0], 0, "", value._replace(reached=reached)).share for reached in (0.0, 1e-6, 2.0)]
+    value = ReachedValue(1, 0.0, 0.0, 0.0)
+    shares = [LimitReading(LIMITS[0], 0, "", value._replace(reached=reached)).share for reached in (0.0, 1e-6, 2.0)]
     assert shares == [0.0, np.inf, np.inf]

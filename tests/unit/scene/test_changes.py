@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from msfp_gen import InputError, changed_scene, load_scene
-from msfp_gen.scene.file.changes import changed_table, keys_of, multiplied_table
+from msfp_gen.scene.file.changes import changed_table, keys_of_path, multiplied_table
 
 TABLE: dict[str, Any] = {
     "motion": {"scale": 1.0},
@@ -97,4 +97,4 @@ def test_messages(path, message):
 
 
 def test_keys():
-    assert keys_of("a.b-c[0][*].d") == ["a", "b-c", 0, None, "d"]
+    assert keys_of_path("a.b-c[0][*].d") == ["a", "b-c", 0, None, "d"]

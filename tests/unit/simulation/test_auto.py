@@ -36,7 +36,7 @@ from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.simulation import bearing_run as simulation
 from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation.bearing_run import BearingRun
-from msfp_gen.simulation.start import RestartState, start_run
+from msfp_gen.simulation.start import RestartState, start_compiled_run
 
 FULL = Effects()
 STILL = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, ORDER)))
@@ -399,7 +399,7 @@ def test_a_state_has_the_rotation_of_the_base_and_what_the_surfaces_remember() -
     turned = Motion.harmonic(0.05, 0.5).rocking(Rotation.harmonic(0.01, 0.02, frequency=0.3, cycles=1.0))
     scene = replace(load_scene("fenz-test2"), motion=turned, motion_table=None, duration=1.0, effects=FULL)
     model = build_model(scene.bearing.layout, scene.modelled)
-    run, azimuth = start_run(scene, model, scene.effect_selection, scene.end, None, ())
+    run, azimuth = start_compiled_run(scene, model, scene.effect_selection, scene.end, None, ())
     run.advance(20)
     state = RestartState.of(model, run, azimuth)
     assert (
@@ -441,7 +441,7 @@ def test_a_run_of_several_models_resumes_to_the_same_rows(tmp_path: Any) -> None
     first = simulate(scene, checkpoint=path, every=0.0)
     models = whole.provenance["model"].count(", then ") + 1
     assert models > 1 and [file.name for file in tmp_path.iterdir()] == ["run.ck"]
-    assert len(checkpoint.read(path)[1]) == models
+    assert len(checkpoint.read_checkpoint(path)[1]) == models
     with pytest.raises(InputError, match="this file exists; resume it"):
         simulate(scene, checkpoint=path)
     again = simulate(scene, checkpoint=path, every=0.0, resume=True)
@@ -458,7 +458,9 @@ def test_a_run_interrupted_before_a_switch_resumes_through_it(tmp_path: Any, mon
     switch = next(note.time for note in whole.notes if note.action)
     with pytest.raises(RunError, match="interrupted"):
         simulate(scene, progress=stopping_at(0.1), checkpoint=path, every=0.0)
-    assert [file.name for file in tmp_path.iterdir()] == ["run.ck"] and checkpoint.read(path)[1][-1].time < switch
+    assert [file.name for file in tmp_path.iterdir()] == ["run.ck"] and checkpoint.read_checkpoint(path)[1][
+        -1
+    ].time < switch
     assert_same(whole, simulate(scene, checkpoint=path, every=0.0, resume=True))
 
 

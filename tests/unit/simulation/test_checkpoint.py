@@ -34,7 +34,7 @@ from msfp_gen.results.result import Result, load_result
 from msfp_gen.scene.scene_fields import Stop
 from msfp_gen.simulation import bearing_run as simulation
 from msfp_gen.simulation import checkpoint
-from msfp_gen.simulation.start import start_run
+from msfp_gen.simulation.start import start_compiled_run
 from msfp_gen.specification.contract import STATUSES, names
 
 SCENES = {
@@ -70,9 +70,9 @@ def test_a_run_stopped_twice_gives_the_same_rows(case: str, tmp_path: Path) -> N
     whole = simulate(scene)
     end = float(whole.history.time[-1])
     first = interrupted(scene, path, 0.3 * end)
-    before = checkpoint.read(path)[1][0].wall
+    before = checkpoint.read_checkpoint(path)[1][0].wall
     second = interrupted(scene, path, 0.7 * end, resume=True)
-    then = checkpoint.read(path)[1][0].wall
+    then = checkpoint.read_checkpoint(path)[1][0].wall
     assert 1 < len(first.history.time) < len(second.history.time) < len(whole.history.time)
     resumed = simulate(scene, checkpoint=path, resume=True)
     assert_same(whole, resumed)
@@ -86,7 +86,7 @@ def test_a_snapshot_of_a_run_with_a_single_row_is_restored() -> None:
     """Before the first step, and with the last row alone."""
     scene = scene_of("fenz-test2", duration=1.0)
     model = build_model(scene.bearing.layout, scene.modelled)
-    run, later = (start_run(scene, model, scene.effect_selection, scene.end, None, ())[0] for _ in range(2))
+    run, later = (start_compiled_run(scene, model, scene.effect_selection, scene.end, None, ())[0] for _ in range(2))
     later.restore(run.snapshot())
     assert len(run.rows) == 1 and len(later.rows) == 1
     run.advance(20)
@@ -107,13 +107,13 @@ def test_what_an_interrupted_run_had_is_a_beginning_of_the_whole(tmp_path: Path)
 
 def test_checkpoints_are_written_every_so_often(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     times: list[float] = []
-    write = checkpoint.write
+    write = checkpoint.write_checkpoint
 
     def seen(path: Path, identity: checkpoint.Identity, segments: list[checkpoint.Saved]) -> None:
         times.append(segments[-1].time)
         write(path, identity, segments)
 
-    monkeypatch.setattr(checkpoint, "write", seen)
+    monkeypatch.setattr(checkpoint, "write_checkpoint", seen)
     monkeypatch.setattr(checkpoint, "WRITE_INTERVAL", 0)
     simulate(scene_of("fenz-test2"), checkpoint=tmp_path / "a.ck", every=0.0)
     assert len(times) > 10 and times == sorted(times) and times[-1] == 56.25
@@ -178,8 +178,8 @@ def test_a_record_whose_data_changed_is_another_scene(saved: Path) -> None:
 
 
 def test_another_build_is_refused(saved: Path, tmp_path: Path) -> None:
-    identity, (segment,) = checkpoint.read(saved)
-    checkpoint.write(tmp_path / "run.ck", identity, [replace(segment, build="0" * 64)])
+    identity, (segment,) = checkpoint.read_checkpoint(saved)
+    checkpoint.write_checkpoint(tmp_path / "run.ck", identity, [replace(segment, build="0" * 64)])
     assert "made by another build of the model" in refusal(scene_of("fenz-test2"), tmp_path / "run.ck")
 
 
@@ -235,13 +235,13 @@ def forged(snapshot: bytes, start: int, content: bytes, **changes: int) -> bytes
 
 
 def test_the_checksum_of_a_snapshot_is_the_one_computed_here(saved: Path) -> None:
-    snapshot = checkpoint.read(saved)[1][0].snapshot
+    snapshot = checkpoint.read_checkpoint(saved)[1][0].snapshot
     assert forged(snapshot, 0, b"") == snapshot
 
 
 def test_a_forged_snapshot_is_refused_before_it_is_used(saved: Path, tmp_path: Path) -> None:
     """Digest and checksum are right, the content is not: no number in it that counts or selects is out of range."""
-    about, (segment,) = checkpoint.read(saved)
+    about, (segment,) = checkpoint.read_checkpoint(saved)
     snapshot = segment.snapshot
     _, _, row, _, identity, size, rows, _, _ = HEADER.unpack_from(snapshot)
     dice, path = random.Random(7), tmp_path / "forged.ck"
@@ -263,14 +263,14 @@ def test_a_forged_snapshot_is_refused_before_it_is_used(saved: Path, tmp_path: P
         "a bit": snapshot[:-3] + bytes([snapshot[-3] ^ 1]) + snapshot[-2:],
     }
     for name, content in contents.items():
-        checkpoint.write(path, about, [replace(segment, snapshot=content)])
+        checkpoint.write_checkpoint(path, about, [replace(segment, snapshot=content)])
         assert "damaged (" in refusal(scene_of("fenz-test2"), path), name
 
 
 def test_a_forged_event_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.ck"
     interrupted(scene_for("planar, rims met"), path, 70.0)
-    about, (segment,) = checkpoint.read(path)
+    about, (segment,) = checkpoint.read_checkpoint(path)
     snapshot = segment.snapshot
     _, _, row, _, _, size, rows, events, _ = HEADER.unpack_from(snapshot)
     assert events > 0
@@ -280,19 +280,19 @@ def test_a_forged_event_is_refused(tmp_path: Path) -> None:
         (8, struct.pack("<i", 99)),
         (12, struct.pack("<i", 99)),
     ):
-        checkpoint.write(path, about, [replace(segment, snapshot=forged(snapshot, first + place, content))])
+        checkpoint.write_checkpoint(path, about, [replace(segment, snapshot=forged(snapshot, first + place, content))])
         assert "damaged (" in refusal(scene_for("planar, rims met"), path), place
 
 
 def test_a_byte_changed_anywhere_in_the_state_ends_no_process(saved: Path) -> None:
     """Refused, or a run goes on from it to a status: with the right checksum, whatever the byte is."""
-    snapshot = checkpoint.read(saved)[1][0].snapshot
+    snapshot = checkpoint.read_checkpoint(saved)[1][0].snapshot
     size, dice, ends = HEADER.unpack_from(snapshot)[5], random.Random(11), set()
     scene = scene_of("fenz-test2", solver={"max_steps": 200})
     model = build_model(scene.bearing.layout, scene.modelled)
     for _ in range(60):
         place = dice.randrange(size)
-        run = start_run(scene, model, scene.effect_selection, scene.end, None, ())[0]
+        run = start_compiled_run(scene, model, scene.effect_selection, scene.end, None, ())[0]
         try:
             identity = HEADER.unpack_from(run.snapshot())[4]  # of fewer steps
             run.restore(forged(snapshot, place, dice.randbytes(4), identity=identity))
@@ -451,7 +451,7 @@ def test_kill_at_any_moment_loses_no_checkpoint(tmp_path: Path, uninterrupted: R
         process.kill()
         process.communicate()
         assert process.returncode == -signal.SIGKILL and not (tmp_path / "run.nc").exists()
-        reached.append(checkpoint.read(path)[1][0].time)
+        reached.append(checkpoint.read_checkpoint(path)[1][0].time)
     assert reached == sorted(set(reached)) and reached[-1] < 0.5
     assert finished(tmp_path) == 0
     assert_same(uninterrupted, load_result(tmp_path / "run.nc"))

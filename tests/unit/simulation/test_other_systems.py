@@ -168,7 +168,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_a_third_kind_runs_through_everything(file: Path, tmp_path: Path) -> None:
     pair = load_scene(file)
-    assert isinstance(pair, Pair) and "pair" in catalogue.words()
+    assert isinstance(pair, Pair) and "pair" in catalogue.words_of_presets()
     result = simulate(pair, strict=True)
     alone = simulate(pair.half)
     assert isinstance(result, PairResult) and result.scene is pair
@@ -248,7 +248,7 @@ BARE = Kind("pair", lambda *args: Bare(pair_from_table(*args).half), lambda _: i
         (("run", "--duration", "1"), "bare: this system has no field duration; leave out the options that change it"),
         (("bench", "model-error", "--duration", "1"), "bare: this system has no field duration; leave out the options"),
         (("run", "--rtol", "1e-3"), "bare: this system has no field solver; leave out the options that change it"),
-        (("run", "--error", "5%"), "bare: errors of this system cannot be measured, since it has no field solver"),
+        (("run", "--error", "5%"), "bare: this system has no field solver; no error can be measured without it"),
         (("plot", "--figure", "all", "-o", "figures"), "--figure = 'all': this system has no figures; its rows are in"),
         (("plot", "-o", "p.png"), "--figure = 'overview': this system has no figures; its rows are in"),
         (("bound", "-o", "b"), "this system has no bearings that can be changed"),
@@ -271,12 +271,20 @@ def test_what_a_kind_does_not_define_is_one_line(
     assert not [path for path in file.parent.iterdir() if path.name in ("c.ck", "figures", "p.png", "b")]
 
 
-def test_a_kind_without_more_runs_and_is_explained(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kind_of_a_dozen_lines_runs_through_everything(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(sys.modules[__name__], "PAIR", BARE)
     kinds.cache_clear()
     bare = load_scene(file)
-    assert np.array_equal(simulate(bare).history.top_force, simulate(bare.whole).history.top_force)
-    assert main(["explain", str(file)]) == 0
+    result = simulate(bare)
+    assert np.array_equal(result.history.top_force, simulate(bare.whole).history.top_force)
+    (again,) = simulate_batch([bare])
+    assert again.summary["peak_force"] == result.summary["peak_force"]
+    assert write_report(result, tmp_path / "bare.html").is_file() and main(["explain", str(file)]) == 0
+    axes = {"load": {"sets": "pair.top.axial_load", "values": [224e3, 112e3]}}
+    study({"scene": str(file), "axes": axes, "keep": []}, tmp_path / "out")
+    assert list(read_study(tmp_path / "out")["status"]) == ["ok", "ok"]
 
 
 def test_a_kind_names_the_table_of_its_bearings(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -299,5 +307,5 @@ def test_what_it_has_not_is_one_line(file: Path) -> None:
 
 
 def test_an_error_cannot_be_asked_without_a_tolerance(file: Path) -> None:
-    with pytest.raises(InputError, match="two: errors of this system cannot be measured, since it has no field solver"):
+    with pytest.raises(InputError, match="two: this system has no field solver"):
         simulate_within(load_scene(file), 0.01)

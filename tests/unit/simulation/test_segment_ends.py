@@ -20,7 +20,7 @@ from msfp_gen.results.result import Result
 from msfp_gen.scene.effect_selection import EffectSelection
 from msfp_gen.simulation.bearing_run import BearingRun
 from msfp_gen.simulation.rows import Segment
-from msfp_gen.simulation.start import start_run
+from msfp_gen.simulation.start import start_compiled_run
 from msfp_gen.simulation.system import finish
 
 BEARING = presets.bearing("fenz-tfp")
@@ -125,7 +125,7 @@ def test_a_last_segment_that_fails_at_once_loses_no_row() -> None:
     lifted = replace(scene, load=Load.constant((0.0, 0.0, 2e5)))  # pulls from the start, and the model has no uplift
     sequence, result = ended(scene)
     first = sequence.segments[0]
-    failed = start_run(lifted, first.model, scene.effect_selection, scene.end, None, ())[0]
+    failed = start_compiled_run(lifted, first.model, scene.effect_selection, scene.end, None, ())[0]
     assert failed.row_count == 0 and failed.status[0] == "uplift"
     sequence.segments.append(Segment(first.model, failed, 0.0, "uplift", 0.0, 0.0))
     for with_initial_row in (False, True):

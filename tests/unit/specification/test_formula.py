@@ -8,7 +8,7 @@ import pytest
 from support.study_tables import cheap_study
 
 from msfp_gen import InputError
-from msfp_gen.scene.file.changes import keys_of
+from msfp_gen.scene.file.changes import keys_of_path
 from msfp_gen.specification.formula import FLOAT_OPERATIONS, MAX_DEPTH, fold, parse, units_of
 from msfp_gen.specification.friction_laws import law_of
 from msfp_gen.studies import load_study
@@ -49,6 +49,6 @@ def test_a_formula_of_the_greatest_depth_is_evaluated_far_down_a_program() -> No
 def test_a_path_that_leads_too_deeply_is_one_line() -> None:
     path = ".".join(["a"] * 2000)
     with pytest.raises(InputError, match="deeper than any table"):
-        keys_of(path)
+        keys_of_path(path)
     with pytest.raises(InputError, match=r"axes.a"):
         load_study(cheap_study(axes={"a": {"sets": path, "values": [1]}}, sampling=None))

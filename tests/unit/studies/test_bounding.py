@@ -35,8 +35,8 @@ from msfp_gen import (
     study,
 )
 from msfp_gen.cli import main
-from msfp_gen.figures.style import COLOURS, distinct
-from msfp_gen.results.quantities import Quantity, Source, quantities
+from msfp_gen.figures.style import COLOURS, distinct_colours
+from msfp_gen.results.quantities import ColumnSource, RunQuantity, quantities
 from msfp_gen.scene.file.loader import scene_text, toml_table
 from msfp_gen.studies import read_study
 from msfp_gen.studies.bounding import (
@@ -437,7 +437,7 @@ def check_uplift_words(found: SuiteBounds, row: dict[str, str], printed: str) ->
 
 def test_no_bound_governs_equal_values_and_no_record_is_their_worst() -> None:
     """Where nothing opened, the heights are 0 at all bounds and under all records; the envelopes stay."""
-    sources = {name: Source(Quantity("m", name, "most")) for name in ("equal", "differs")}
+    sources = {name: ColumnSource(RunQuantity("m", name, "most")) for name in ("equal", "differs")}
     values = {"equal": np.zeros((2, 3)), "differs": np.array([[0.0, 0.0, 0.0], [0.0, 2.0, 1.0]])}
     found = SuiteBounds("", "asce7", ("A", "B"), (), sources, values, {}, {}, {})
     equal, differs = found.statistics
@@ -675,5 +675,5 @@ def test_a_run_that_met_its_stop_condition_is_in_no_mean(tmp_path: Path, capsys:
 
 
 def test_records_of_a_suite_have_different_colours() -> None:
-    assert distinct(4) == list(COLOURS[:4])
-    assert all(len(set(distinct(count))) == count for count in (7, 11, 22, 44))
+    assert distinct_colours(4) == list(COLOURS[:4])
+    assert all(len(set(distinct_colours(count))) == count for count in (7, 11, 22, 44))

@@ -11,7 +11,7 @@ from support import Array
 from msfp_gen.common.errors import RunError
 from msfp_gen.studies.calibration.fitting import LEAST, SMALL, Solution, least_squares, solve
 from msfp_gen.studies.calibration.intervals import identified, lag_one, noise_of, spread_of
-from msfp_gen.studies.calibration.residuals import Evaluation
+from msfp_gen.studies.calibration.residuals import EvaluatedResiduals
 
 ROWS = 60
 TIMES = np.linspace(0, 1, ROWS)
@@ -104,18 +104,18 @@ class Runs:
     def split(self, rows: Array) -> list[Array]:
         return [rows]
 
-    def at(self, x: Array) -> Evaluation:
+    def at(self, x: Array) -> EvaluatedResiduals:
         return self.evaluate(x)
 
-    def evaluate(self, x: Array, jacobian: Array | None = None) -> Evaluation:
+    def evaluate(self, x: Array, jacobian: Array | None = None) -> EvaluatedResiduals:
         self.count += 1
         if self.rtol < self.fails:
-            return Evaluation(np.full(ROWS, 10.0), np.zeros_like(SLOPE), (), RunError("no", status="newton"))
+            return EvaluatedResiduals(np.full(ROWS, 10.0), np.zeros_like(SLOPE), (), RunError("no", status="newton"))
         wrong = self.error * self.deviation * (self.rtol / 1e-4) ** 0.25
         noise = self.noise * np.random.default_rng(5).standard_normal(ROWS)
         noise -= SLOPE @ np.linalg.lstsq(SLOPE, noise)[0]
         residuals = SLOPE @ (x - TRUE) + wrong * SLOPE[:, 0] + noise
-        return Evaluation(residuals, SLOPE * (1 + self.slip) if jacobian is None else jacobian)
+        return EvaluatedResiduals(residuals, SLOPE * (1 + self.slip) if jacobian is None else jacobian)
 
 
 def solved(runs: Runs) -> Solution:
@@ -164,10 +164,12 @@ class Line:
     def __init__(self, low: float = np.inf, high: float = np.inf) -> None:
         self.low, self.high = low, high
 
-    def at(self, x: Array) -> Evaluation:
+    def at(self, x: Array) -> EvaluatedResiduals:
         if self.low < x[0] < self.high:
-            return Evaluation(np.full(60, 10.0), np.zeros((60, 1)), failure=RunError("stopped", status="newton"))
-        return Evaluation(LINE_SLOPE * (x[0] - 2.0) + LINE_NOISE, LINE_SLOPE[:, None])
+            return EvaluatedResiduals(
+                np.full(60, 10.0), np.zeros((60, 1)), failure=RunError("stopped", status="newton")
+            )
+        return EvaluatedResiduals(LINE_SLOPE * (x[0] - 2.0) + LINE_NOISE, LINE_SLOPE[:, None])
 
 
 @pytest.mark.parametrize(("low", "high"), [(1.0, 10.0), (1.2, 1.9)], ids=["all above the start", "a gap"])
@@ -184,6 +186,6 @@ def test_a_failed_run_on_the_way_does_not_matter() -> None:
 
 
 def test_a_step_of_no_length_is_within_the_errors_of_an_exact_fit() -> None:
-    exact = Evaluation(np.zeros(60), LINE_SLOPE[:, None])
+    exact = EvaluatedResiduals(np.zeros(60), LINE_SLOPE[:, None])
     assert exact.step_in_errors(np.zeros(1)) == 0.0
     assert exact.step_in_errors(np.ones(1)) == np.inf

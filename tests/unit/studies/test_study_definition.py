@@ -16,7 +16,7 @@ import msfp_gen
 from msfp_gen import InputError, changed_scene, load_scene, simulate
 from msfp_gen.motions.records import response_spectrum
 from msfp_gen.motions.records.spectrum import MEASURES
-from msfp_gen.results.quantities import BEARING, Source, sources_of
+from msfp_gen.results.quantities import BEARING, ColumnSource, sources_of
 from msfp_gen.scene.file.loader import scene_from_table, toml_file
 from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.studies import load_study
@@ -236,7 +236,7 @@ def test_extremes_of_formulas_are_over_all_steps_where_a_run_records_them() -> N
     assert found["tilt"] == abs(few.history.tilt_angles[:, 0, 0]).max()
 
 
-def of_surfaces(count: int) -> tuple[tuple[str, Source], ...]:
+def of_surfaces(count: int) -> tuple[tuple[str, ColumnSource], ...]:
     """The quantities of a bearing with so many surfaces."""
     return tuple(sources_of(BEARING, {}, count).items())
 

@@ -19,14 +19,14 @@ from msfp_gen import BaseSlab, Building, InputError, RunError, Storey, changed_s
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.results.result import load_result
 from msfp_gen.scene.file import motion_tables
-from msfp_gen.scene.file.catalogue import scene_table
+from msfp_gen.scene.file.catalogue import preset_scene_table
 from msfp_gen.scene.file.loader import dumps
 from msfp_gen.studies import load_study
 from msfp_gen.studies.bounding.factors import factor_text
 from msfp_gen.studies.run import Chunks
 
 SHORT = {  # a run of a few milliseconds
-    **scene_table("fenz-test1"),
+    **preset_scene_table("fenz-test1"),
     "bearing": "fenz-tfp",
     "solver": {"rtol": 1e-2},
 }

@@ -28,7 +28,7 @@ from support.study_tables import cheap_study, rows_of, write_record
 
 import msfp_gen
 from msfp_gen import InputError, simulate
-from msfp_gen.scene.file.catalogue import scene_table
+from msfp_gen.scene.file.catalogue import preset_scene_table
 from msfp_gen.scene.file.loader import dumps
 from msfp_gen.studies import load_study
 
@@ -52,7 +52,7 @@ def random_study(rng: np.random.Generator, folder: Path) -> Path:
     for name in ("a", "b", "c"):
         write_record(folder / f"{name}.csv", float(f"{rng.uniform(0.3, 3.0):.2f}"))
     pivot = {"preset": "fenz-tfp", "friction": [0.05, 0.017, 0.017, 0.1], "friction_at": "pivot"}
-    scene = {**scene_table("fenz-test1"), "solver": {"rtol": 1e-2}}
+    scene = {**preset_scene_table("fenz-test1"), "solver": {"rtol": 1e-2}}
     scene |= {"bearing": pivot if rng.random() < 0.5 else "fenz-tfp"}
     scene |= {"motion": {"kind": "record", "file": "a.csv", "correct": False}}
     chosen = [AXES[index] for index in rng.choice(len(AXES), rng.integers(1, 3), replace=False)]

@@ -21,7 +21,7 @@ from support.study_tables import cheap_study, rows_of
 
 import msfp_gen
 from msfp_gen import InputError, RunError, simulate
-from msfp_gen.scene.file.catalogue import scene_table
+from msfp_gen.scene.file.catalogue import preset_scene_table
 from msfp_gen.studies import load_study, read_study, study_status
 from msfp_gen.studies import run as running
 from msfp_gen.studies.axes import SceneFactory
@@ -301,7 +301,7 @@ def test_a_damaged_part_is_an_error_that_says_so(tmp_path: Path) -> None:
 def test_a_row_costs_few_calls() -> None:
     """Calls of Python in a planar row, which do not depend on the load of the machine: 3100, and 4500 before."""
     effects = {"dimension": "planar", "sliders": "massless", "rims": False, "bouc_wen": "plastic"}
-    scene = {**scene_table("fenz-test1"), "effects": effects, "solver": {"rtol": 1e-2}}
+    scene = {**preset_scene_table("fenz-test1"), "effects": effects, "solver": {"rtol": 1e-2}}
     axes = {"friction": {"multiplies": "bearing.friction", "values": [0.9, 1.0, 1.1, 1.2]}}
     study = load_study({"scene": scene, "axes": axes, "keep": ["peak_displacement", "peak_force", "peak_sliding"]})
     factory, calls = SceneFactory(study.inputs), 0

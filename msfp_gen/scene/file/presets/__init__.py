@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def names(kind: str | None = None) -> dict[str, str]:
     """Name -> one line of description, of the presets of a `kind` ("bearing", "scene", "building"), or of all."""
-    kinds = catalogue.words() if kind is None else (kind,)
+    kinds = catalogue.words_of_presets() if kind is None else (kind,)
     return {name: line for word in kinds for name, line in catalogue.descriptions(word).items()}
 
 
@@ -31,4 +31,4 @@ def scene(name: str) -> Scene:
     """
     from msfp_gen.scene.file.loader import scene_from_table
 
-    return scene_from_table(catalogue.scene_table(name))
+    return scene_from_table(catalogue.preset_scene_table(name))

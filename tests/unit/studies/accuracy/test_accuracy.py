@@ -15,8 +15,8 @@ from msfp_gen.cli import main
 from msfp_gen.studies.accuracy import study, work_precision
 from msfp_gen.studies.accuracy.methods import METHODS, methods_named
 from msfp_gen.studies.accuracy.study import (
+    ErrorStudy,
     Point,
-    Study,
     confirming_reruns,
     is_wrong,
     model_errors,
@@ -218,7 +218,7 @@ def test_failures_and_wrong_successes_are_marked():
     reference = Reference(trial(rtol=1e-9), trial("b"), errors(trial(wave=1e-6), trial()))
     runs = [trial(wave=0.2), trial(status="newton"), trial(status=CUT_OFF, reached=0.1, seconds=2.0)]
     points = tuple(study.point_of("a", run, reference) for run in runs)
-    made = Study(load_scene("fenz-test1"), "work-precision", points, reference, ())
+    made = ErrorStudy(load_scene("fenz-test1"), "work-precision", points, reference, ())
     columns = study.figure_table(made)["a"]
     assert columns["wrong"] == [1, 0, 0] and columns["failed"] == [0, 1, 0] and columns["cut"] == [0, 0, 1]
     assert columns["seconds"][2] == pytest.approx(20.0) and columns["newton"][2] == pytest.approx(50.0)
@@ -237,7 +237,7 @@ def test_the_summary_marks_the_tolerance_of_the_scene(tmp_path):
     reference = Reference(trial(rtol=1e-9), trial("b"), errors(trial(wave=1e-6), trial()))
     runs = [trial("implicit", 10 * scene.solver.rtol, 0.01), trial("implicit", scene.solver.rtol, 0.001)]
     points = tuple(study.point_of("implicit", run, reference) for run in runs)
-    made = Study(scene, "work-precision", points, reference, ())
+    made = ErrorStudy(scene, "work-precision", points, reference, ())
     assert study.default_point(made) is points[1]
     line = study.summary_line(made)
     assert f"{100 * points[1].errors.worst_rms:.2g} %" in line and "1.00 s" in line and f"{scene.solver.rtol:g}" in line

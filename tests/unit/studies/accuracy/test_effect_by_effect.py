@@ -9,11 +9,11 @@ from support import ROOT
 
 from msfp_gen import Limits, load_scene, simulate
 from msfp_gen.common.errors import InputError
-from msfp_gen.results.verdict import Limit, Reading, Value
+from msfp_gen.results.verdict import Limit, LimitReading, ReachedValue
 from msfp_gen.scene.friction_parameters import bearing_for
 from msfp_gen.scene.system import OtherSystem
 from msfp_gen.specification.friction_laws import BUILT_IN, law_of
-from msfp_gen.studies.accuracy.effect_by_effect import Outcome, _change, _states, effect_by_effect, simpler_laws
+from msfp_gen.studies.accuracy.effect_by_effect import EffectRun, _change, _states, effect_by_effect, simpler_laws
 
 SCENE = replace(load_scene("fenz-test2"), duration=4.0)
 
@@ -28,10 +28,10 @@ class Bare(OtherSystem):
 def outcome(values, **limits):
     """A made-up run: two values of a quantity, and limits of 1 with what was reached."""
     readings = {
-        name: Reading(Limit(name, name, "N", lambda *_: ()), 0, "", Value(0, None, reached, 1.0))
+        name: LimitReading(Limit(name, name, "N", lambda *_: ()), 0, "", ReachedValue(0, None, reached, 1.0))
         for name, reached in limits.items()
     }
-    return Outcome({"a": np.array(values)}, readings, 1.0)
+    return EffectRun({"a": np.array(values)}, readings, 1.0)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Values of a building that are hardly meant are refused, or named with the likely unit; published designs are not."""
+"""Values of a bearing, a motion or a building that are hardly meant are refused or named; published designs are not."""
 
 from __future__ import annotations
 

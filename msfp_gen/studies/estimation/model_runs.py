@@ -9,21 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, Flags, Indices
 from msfp_gen.common.errors import InputError, RunError
-from msfp_gen.studies.assessment.rows import COMPLETE, numbers, read_study
+from msfp_gen.studies.assessment.rows import COMPLETE, column_numbers, read_study
 from msfp_gen.studies.axes import Sampling, SceneFactory, values_at
 from msfp_gen.studies.definition import Study
 from msfp_gen.studies.estimation.estimators import EXACT
 from msfp_gen.studies.run import STUDY_FILE, parts_in, readable_parts, run_on, study_table
 from msfp_gen.studies.workers import Pool
 
-Indices = np.ndarray[Any, np.dtype[np.intp]]
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
 DISPLACEMENT = "peak_displacement"  # with it a regression follows forces that are no line of the cheap ones
 BLOCK = 1024  # draws that are made together
 CHUNKS = {EXACT: 4, "equivalent": 64}  # model -> runs of a part
@@ -31,7 +29,7 @@ CHUNK = 8  # runs of a part of any other model
 MEASURED = 4  # parts from which the cost of a run is computed
 
 
-class Source(Protocol):
+class ModelRuns(Protocol):
     """Runs of several models on the same draws.
 
     levels: names of the models, the exact model first. population: number of draws that exist; None: unlimited.
@@ -91,7 +89,7 @@ class Draws:
         return self._blocks[block]
 
 
-class StudySource:
+class StudyModelRuns:
     """The source of a study: exact runs are in the folder of the study, runs of each other model in a folder within.
 
     progress: called with the name of a model and the number of draws, before `values` of these draws.
@@ -110,7 +108,7 @@ class StudySource:
             level: _Model(
                 level_study(study, level, quantity),
                 own_folder,
-                names_of(study, level, quantity),
+                quantities_of_model(study, level, quantity),
                 self.draws,
                 pool,
                 exact=level == EXACT,
@@ -120,17 +118,17 @@ class StudySource:
         self._progress = progress
 
     def values(self, level: str, count: int) -> tuple[Array, Flags]:
-        """See `Source`."""
+        """See `ModelRuns`."""
         if self._progress is not None:
             self._progress(level, count)
         return self._models[level].values(count)
 
     def cost(self, level: str) -> float:
-        """See `Source`."""
+        """See `ModelRuns`."""
         return self._models[level].cost()
 
     def spent(self) -> tuple[float, dict[str, int]]:
-        """See `Source`."""
+        """See `ModelRuns`."""
         runs = {level: model.count for level, model in self._models.items() if model.count}
         return sum(count * self.cost(level) for level, count in runs.items()), runs
 
@@ -158,7 +156,7 @@ class _Model:
     def _run(self) -> None:
         run_on(self.pool, self._listed_study(), self.folder)
         rows = read_study(self.folder, list(self.names))
-        values = np.stack([numbers(rows, name) for name in self.names], axis=1)
+        values = np.stack([column_numbers(rows, name) for name in self.names], axis=1)
         values = values[:, 0] if len(self.names) == 1 else values
         complete = np.asarray(rows["status"] == COMPLETE)
         if len(values) < self.count:
@@ -197,20 +195,20 @@ class _Model:
 
 
 def level_study(study: Study, level: str, quantity: str) -> Study:
-    """The study of one model: the exact model keeps all quantities of the study, any other keeps `names_of`."""
+    """The study of one model: the exact model keeps all its quantities, any other keeps `quantities_of_model`."""
     chunk = CHUNKS.get(level, CHUNK)
     if level == EXACT:
         return replace(study, given_chunk=study.given_chunk or chunk)
     scene = {**study.inputs.scene, "fidelity": level}
     formulas = tuple((name, text) for name, text in study.keep.formulas if name == quantity)
-    names = [name for name in names_of(study, level, quantity) if name not in dict(formulas)]
+    names = [name for name in quantities_of_model(study, level, quantity) if name not in dict(formulas)]
     keep = replace(study.keep, names=tuple(names), formulas=formulas)
     table = {key: value for key, value in study.table.items() if key not in ("keep", "quantities")}
     table |= {"scene": scene, "keep": list(keep.names), "quantities": dict(formulas)}
     return replace(study, inputs=replace(study.inputs, scene=scene), keep=keep, table=table, given_chunk=chunk)
 
 
-def names_of(study: Study, level: str, quantity: str) -> list[str]:
+def quantities_of_model(study: Study, level: str, quantity: str) -> list[str]:
     """The quantities that a model gives: the quantity, and of a cheap model the peak displacement beside it."""
     second = level != EXACT and quantity != DISPLACEMENT and DISPLACEMENT in study.keep.known
     return [quantity, DISPLACEMENT] if second else [quantity]
