@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ from latex2mathml.converter import convert
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 from sphinx.highlighting import lexers
+from sphinx.util.inspect import TypeAliasForwardRef
 
 from msfp_gen.common.version import __version__
 
@@ -61,8 +64,8 @@ autodoc_typehints = "description"
 autodoc_typehints_format = "short"
 autodoc_class_signature = "mixed"
 autodoc_type_aliases = {"Array": "ndarray", "ArrayLike": "array_like"}
+TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # type: ignore[method-assign]  # inside other types
 napoleon_use_rtype = False
-napoleon_use_ivar = True
 python_use_unqualified_type_names = True
 default_role = "code"
 highlight_language = "text"  # blocks without a language are commands and what they print
@@ -112,6 +115,9 @@ def _block(writer: Any, node: nodes.math_block) -> None:
 TYPES = {
     r"~numpy[\w.]*\._Buffer \| .*?_NestedSequence\[complex \| bytes \| str\]": "array_like",
     r"~numpy\.ndarray\[~?tuple\[~typing\.Any, \.\.\.\], ~numpy\.dtype\[~numpy\.\w+\]\]": "ndarray",
+    r"~?\b(?:\w+\.)*ArrayLike\b": "array_like",
+    r"~?\b(?:\w+\.)*Array\b": "ndarray",
+    r"~dataclasses\.InitVar\[(\w+)\]": r"\1",
     r"~typ(?:es|ing)\.Annotated"
     r"\[((?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])+?), ~?[\w.]+\((?:[^()]|\([^()]*\))*\)\]": r"\1",
 }
@@ -123,18 +129,53 @@ def _types(app: Sphinx, *_: Any) -> None:
         for name in shown:
             for pattern, simple in TYPES.items():
                 shown[name] = re.sub(pattern, simple, shown[name])
+        if shown.get("return") == "None":
+            del shown["return"]
 
 
-def _sentence(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    """What stands before a colon in the sentence of a property is no type, as napoleon has it."""
+def _docstring(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Prepare a docstring for napoleon, which takes what stands before a colon in a property for its type."""
     if what == "property" and lines:
-        lines[0] = lines[0].replace(": ", " - ", 1)
+        head, colon, rest = lines[0].partition(": ")
+        lines[:1] = [head + colon.strip(), rest] if colon else [head]
+    elif what == "class":  # the fields of a class are its parameters: one list has text and type
+        lines[:] = ["Args:" if line == "Attributes:" else line for line in lines]
+    if callable(obj) and "Args:" not in lines:
+        lines[:] = _listed(inspect.signature(obj).parameters, "\n".join(lines)).splitlines()
+
+
+def _listed(names: Iterable[str], text: str) -> str:
+    """A docstring whose sentences of the kind `name: what it is [unit].` stand in a section Args."""
+    name = rf"(?:{'|'.join(map(re.escape, names))})\b"
+    head = rf"{name}(?:, {name})*(?=[:;] | \[)"
+    body, entries, sections = [], [], []
+    for paragraph in text.split("\n\n"):
+        if re.match(r"\w+:\n ", paragraph) or not re.search(head, paragraph):
+            (sections if re.match(r"\w+:\n ", paragraph) else body).append(paragraph)
+            continue
+        first, *found = re.split(rf"(?:^|(?<=[.;] ))(?={head})", " ".join(paragraph.split()))
+        end = ""
+        if found:
+            found[-1], *rest = re.split(r"(?<=\. )(?=Raises |Returns )", found[-1], maxsplit=1)
+            end = "".join(rest)
+        body += [part.strip() for part in (first, end) if part]
+        entries += [re.sub(rf"({head})[:;]? ", r"    \1: ", one.strip(" ;"), count=1) for one in found]
+    listed = ["Args:\n" + "\n".join(entries)] if entries else []
+    return "\n\n".join([*body, *listed, *sections])
+
+
+def _short_cells(app: Sphinx, document: nodes.document) -> None:
+    """Mark cells of a number and its unit, which stay in one line."""
+    for cell in document.findall(nodes.entry):
+        if len(cell.astext()) <= 10:
+            cell["classes"].append("short")
 
 
 def setup(app: Sphinx) -> None:
     """Formulas become MathML, which browsers draw without a script; the search shows excerpts without a server."""
     app.connect("object-description-transform", _types, priority=400)
-    app.connect("autodoc-process-docstring", _sentence, priority=400)
+    app.connect("autodoc-process-docstring", _docstring, priority=400)
+    app.connect("doctree-read", _short_cells)
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
     app.add_transform(terms.Entries)
     app.connect("html-page-context", excerpts.only_on_search)

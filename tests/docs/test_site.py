@@ -50,7 +50,7 @@ def test_the_python_interface_is_complete() -> None:
     import msfp_gen
 
     page = "".join(path.read_text(encoding="utf-8") for path in sorted((SITE / "api").glob("*.md")))
-    named = set(re.findall(r"auto(?:class|function|exception):: (\w+)$", page, re.MULTILINE))
+    named = set(re.findall(r"auto(?:class|function|exception):: (\w+)(?:\(\w*\))?$", page, re.MULTILINE))
     assert named == set(msfp_gen.__all__) - {"__version__", "presets"}
     assert "msfp_gen.scene.file.presets" in page
 

@@ -19,8 +19,13 @@ found = bound(scene, load_factors("asce7"))
 # Which case governs which demand. A rim that is met has no capacity left.
 
 values, governing = found.quantities(), found.governing()
-for name in ("peak_displacement", "peak_force", "capacity_left_1"):
-    print(f"{name:18}", {case: float(f"{value:.3g}") for case, value in values[name].items()}, governing[name])
+for name, unit, factor in (
+    ("peak_displacement", "mm", 1e3),
+    ("peak_force", "kN", 1e-3),
+    ("capacity_left_1", "mm", 1e3),
+):
+    each = ", ".join(f"{case} {factor * value:.1f}" for case, value in values[name].items())
+    print(f"{name:18}{each} {unit}; {governing[name]} governs")
 
 # %%
 # The distance of the top plate from the centre.
