@@ -19,11 +19,8 @@ found = bound(scene, load_factors("asce7"))
 # Which case governs which demand. A rim that is met has no capacity left.
 
 values, governing = found.quantities(), found.governing()
-for name, unit, factor in (
-    ("peak_displacement", "mm", 1e3),
-    ("peak_force", "kN", 1e-3),
-    ("capacity_left_1", "mm", 1e3),
-):
+units = {"peak_displacement": ("mm", 1e3), "peak_force": ("kN", 1e-3), "capacity_left_1": ("mm", 1e3)}
+for name, (unit, factor) in units.items():
     each = ", ".join(f"{case} {factor * value:.1f}" for case, value in values[name].items())
     print(f"{name:18}{each} {unit}; {governing[name]} governs")
 
