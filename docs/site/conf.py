@@ -165,9 +165,10 @@ def _listed(names: Iterable[str], text: str) -> str:
 
 
 def _short_cells(app: Sphinx, document: nodes.document) -> None:
-    """Mark cells of a number and its unit, which stay in one line."""
+    """Mark cells of a number and its unit, or of one name of the code, which stay in one line."""
     for cell in document.findall(nodes.entry):
-        if len(cell.astext()) <= 10:
+        text, names = cell.astext(), list(cell.findall(nodes.literal))
+        if len(text) <= (20 if names and " " not in text else 10):
             cell["classes"].append("short")
 
 
