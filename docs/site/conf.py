@@ -164,19 +164,23 @@ def _listed(names: Iterable[str], text: str) -> str:
     return "\n\n".join([*body, *listed, *sections])
 
 
-def _short_cells(app: Sphinx, document: nodes.document) -> None:
-    """Mark cells of a number and its unit, or of one name of the code, which stay in one line."""
-    for cell in document.findall(nodes.entry):
-        text, names = cell.astext(), list(cell.findall(nodes.literal))
-        if len(text) <= (20 if names and " " not in text else 10):
+def _widths(app: Sphinx, document: nodes.document) -> None:
+    """Mark cells of a number and its unit, which stay in one line, and names of the code that are too long for one."""
+    cells = list(document.findall(nodes.entry))
+    for cell in cells:
+        if len(cell.astext()) <= 10:
             cell["classes"].append("short")
+    for places, most in ((cells, 20), ([document], 45)):
+        for name in (name for place in places for name in place.findall(nodes.literal)):
+            if max(map(len, name.astext().split()), default=0) > most:
+                name["classes"].append("long")
 
 
 def setup(app: Sphinx) -> None:
     """Formulas become MathML, which browsers draw without a script; the search shows excerpts without a server."""
     app.connect("object-description-transform", _types, priority=400)
     app.connect("autodoc-process-docstring", _docstring, priority=400)
-    app.connect("doctree-read", _short_cells)
+    app.connect("doctree-read", _widths)
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
     app.add_transform(terms.Entries)
     app.connect("html-page-context", excerpts.only_on_search)
