@@ -130,6 +130,20 @@ def test_every_example_has_a_place_in_its_section(monkeypatch: pytest.MonkeyPatc
     assert all(len(title) == len(line) <= 62 and set(line) == {"="} for title, line in titles)
 
 
+@needs_sphinx
+def test_sentences_on_parameters_become_a_list(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "A load. unit: of it.\n\nIt may jump.\n\nforce, moment: at\nrest [N]; time [s]. Raises InputError."
+    text += "\n\nRaises:\n    RunError: no."
+    names = ("force", "moment", "time", "unit")
+    assert site_module(monkeypatch, "conf")._listed(names, text).split("\n\n") == [
+        "A load.",
+        "It may jump.",
+        "Raises InputError.",
+        "Args:\n    unit: of it.\n    force, moment: at rest [N]\n    time: [s].",
+        "Raises:\n    RunError: no.",
+    ]
+
+
 @pytest.mark.slow
 def test_report_of_the_hospital_page_is_complete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     make_site = site_module(monkeypatch, "make_site")
