@@ -34,7 +34,7 @@ def main() -> None:
     """Print the table."""
     parser(__doc__).parse_args()
     columns = ("record", "stiffness [N/m]", "frequency [Hz]", "damping", "roof, vertical", "roof, horizontal")
-    columns += ("N over N at rest", "displacement [mm]", "base shear over weight")
+    columns += ("N over N at rest", "u [mm]", "base shear over weight")
     print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
     for name in RECORDS:
         scene = load_scene(name)

@@ -178,17 +178,18 @@ and a converged reference, and what others need for them.
 
 ## Rules
 
-1. Equal data: `scene.toml` of each folder, in SI units: geometry, friction, masses, rig or mass. The equations are those of
-   PEER Report 2017/07 ([what they are](../../docs/equations.md)). An entrant with other equations, as OpenSees with its
+1. Equal data: `scene.toml` of each folder, in SI units: geometry, friction, masses, rig or mass. PEER Report 2017/07 has the
+   equations ([what they are](../../docs/equations.md)). An entrant with other equations, as OpenSees with its
    element of springs in series, is measured against its own solution at its finest step, not against ours: the race is one of
    integrators, and [accuracy](../../docs/accuracy.md) compares models.
 2. The answer is the horizontal force on the top at the instants of `reference.csv`, by the entrant's own interpolation. The
    error is its root mean square over time, over the peak of the force.
-3. Seconds are those of the integration on one core, without reading, compiling and writing; the fastest of three where a run
+3. Seconds count the integration on one core, without reading, compiling and writing; the fastest of three where a run
    takes less than one. A run is cut off after {limit:g} s. Tolerances go from 0.1 to 1e-8 in factors of ten, steps of
    methods without error control from 500 in factors of two.
 4. The reference is the tightest run of the pair that agrees best among methods of different families. What they differ by is
-   stated; a bound below ten times this difference has a question mark. The reference of OpenSees is its finest run.
+   stated; a bound below ten times this difference has a question mark, and a dash stands where no run is within the
+   bound. The reference of OpenSees is its finest run.
 
 SciPy's methods step in Python and call the compiled equations with their exact Jacobian, so their seconds are what a user
 of SciPy waits for. MuJoCo and Drake are not among the entrants. A sphere in a dish is possible there, by signed distances

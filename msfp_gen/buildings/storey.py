@@ -86,8 +86,8 @@ class Storey:
     height: from the floor below [m]. mass, inertia, mass_centre: of the floor, as in `BaseSlab`. stiffness: of all
     columns along E1 and E2, of a column with fixed ends 12 E I/h^3; one number for both directions [N/m].
     torsional_stiffness: about E3 through the stiffness centre [N m/rad]. stiffness_centre: in plan [m].
-    vertical_stiffness [N/m] and rocking_stiffness, about E1 and E2 [N m/rad]: of columns that shorten; None for both:
-    in vertical motion and tilt the floor follows the floor below. Raises InputError.
+    vertical_stiffness: of columns that shorten [N/m]. rocking_stiffness: of the same columns about E1 and E2
+    [N m/rad]. None for both: in vertical motion and tilt the floor follows the floor below. Raises InputError.
     """
 
     height: Annotated[float, Quantity("m", above=0.0)]

@@ -276,8 +276,8 @@ class BuildingCharacterisation(Characterisation):
 
     Attributes:
         secant_period: of the building as a rigid mass on the secant stiffness [s].
-        peak_floor_acceleration: horizontal, of any floor at its centre of mass [m/s^2]. peak_drift_ratio: of any storey
-            at its stiffness centre [-]; None without storeys.
+        peak_floor_acceleration: horizontal, of any floor at its centre of mass [m/s^2].
+        peak_drift_ratio: of any storey at its stiffness centre [-]; None without storeys.
         bearings: the demand on each bearing.
     """
 

@@ -166,13 +166,13 @@ class Load(Prescribed):
     @classmethod
     @quantities(force="N", moment="N m")
     def constant(cls, force: ArrayLike, moment: ArrayLike = (0.0, 0.0, 0.0)) -> Load:
-        """Constant load. force, moment: shape (3,), [N], [N m]."""
+        """Constant load. force: shape (3,) [N]. moment: shape (3,) [N m]."""
         return cls._constant(np.concatenate([vector("load.force", force), vector("load.moment", moment)]))
 
     @classmethod
     @quantities(force="N", moment="N m", duration="s")
     def ramp(cls, force: ArrayLike, moment: ArrayLike = (0.0, 0.0, 0.0), *, duration: float) -> Load:
-        """Smooth increase from zero to force, moment: shape (3,), [N], [N m], in `duration` [s]."""
+        """Smooth increase from zero. force: at its end, shape (3,) [N]. moment: shape (3,) [N m]. duration: [s]."""
         return cls._ramp(np.concatenate([vector("load.force", force), vector("load.moment", moment)]), duration)
 
     @classmethod

@@ -342,7 +342,7 @@ class Result(AnyResult):
 
     @property
     def number(self) -> int:
-        """Number of the bearing below a building, from 1; 0: the bearing is alone."""
+        """Number of the bearing below a building, from 1; it is 0 for a bearing alone."""
         return 0 if self.mounting is None else self.mounting.number
 
     @property

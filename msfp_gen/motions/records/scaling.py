@@ -52,7 +52,8 @@ class ScaleTo:
         sd1: ordinate of the same spectrum at 1 s [m/s^2].
         long_period: its transition period to constant displacement, T_L [s].
         ag: design ground acceleration of EN 1998-1 on ground of type A, gamma_I a_gR [m/s^2].
-        ground: type of the ground of EN 1998-1, A to E. spectrum_type: 1 or 2.
+        ground: type of the ground of EN 1998-1, A to E.
+        spectrum_type: type of its spectrum, 1, or 2 for magnitudes of at most 5.5.
         spectrum: path of a CSV file with the header `period [s], Sa [g]` or other units, or pairs [s], [m/s^2].
         between: shortest and longest period of the fit to a spectrum [s], by least squares of the logarithms.
         component: component or measure that meets the target: E1, E2, E3, geomean, rotd50 or rotd100.
