@@ -22,7 +22,7 @@ FAST = {"README.md", "fenz-test2"}
 def test_the_stated_error_of_presets_and_examples_holds(name: str) -> None:
     """Of README's scene, the examples and all presets, whose ringing is not damped."""
     scene = dict(chain(promises.own(), promises.all_presets()))[name]
-    tight = promises.TIGHT if name in OWN else promises.RESOLVED
+    tight = promises.TIGHT if name in OWN else promises.OF_PRESETS
     try:
         found = promises.promise(name, scene, tight=tight)
     except RunError as error:
