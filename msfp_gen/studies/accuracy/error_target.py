@@ -3,9 +3,9 @@
 A reference run by a method of other stages, at a tenth of the tolerance, estimates the error. Its steps are at most
 half the mean step. Where nothing damps the ringing of stuck sliders, its tolerance is so small that it resolves what
 the other runs filter, and a run by the default method, which resolves the ringing too, confirms it. Where this ringing
-or the difference of these two runs exceeds the target, or there is no time for them, no error is stated, but what the
-ringing changes in this scene is. SAFETY covers the error of the reference run; docs/accuracy.md compares such estimates
-with true errors. Half of the requested error is for effect selection, half for the method.
+exceeds the target, where these two runs differ by more than a tenth of it, or where there is no time for them, no error
+is stated, but what the ringing changes in this scene is. SAFETY covers the error of the reference run; docs/accuracy.md
+compares such estimates with true errors. Half of the requested error is for effect selection, half for the method.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ STEPS_PER_PERIOD = 40  # of a reference run in the period of a damped slider
 MOST_STEPS = 200_000  # of such a run: some seconds; longer runs do without
 RESOLVING, CONFIRMING = 1e-8, 1e-7  # tolerances of a reference run that resolves undamped ringing, and of a second one
 RESOLVING_SHARE = 0.5  # of the time left, which each of them may take
+KNOWN = 0.1  # of the target: what these two runs may differ by
 SAFETY = 1.5  # factor on the difference from the reference run, which has an error of its own
 DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays
 STAGNATION_RATIO = 0.7  # ratio of errors over two candidates above which the tolerance is not their cause
@@ -276,7 +277,7 @@ class _Search:
         """The reference run of the run at a candidate tolerance. Raises RunError as `trial`."""
         if index not in self.references:
             tolerance = CANDIDATE_TOLERANCES[index + REFERENCE_OFFSET]
-            self.filtered = self.filtered or (self.rings and self.doubt >= self.target)
+            self.filtered = self.filtered or (self.rings and self.doubt > KNOWN * self.target)
             if self.rings and not self.filtered and tolerance >= RESOLVING:
                 self.references[index] = self.resolved
             else:
@@ -391,8 +392,8 @@ class _Search:
         return Attempt(trial.method, trial.rtol, trial.seconds, trial.newton, estimate, differences, trial.status)
 
     def _error_of_ringing(self, index: int) -> float:
-        """Estimated error of a run against the two that resolve undamped ringing; infinite where one did not end."""
-        found = errors(self.trial(index), self.resolved) if self.doubt < inf else None
+        """Estimated error of a run against one that resolves undamped ringing; infinite where none is confirmed."""
+        found = errors(self.trial(index), self.resolved) if self.doubt <= KNOWN * self.target else None
         return inf if found is None else found.largest + max((SAFETY - 1) * found.largest, self.doubt)
 
     def next_step(self, index: int) -> Attempt | None:
