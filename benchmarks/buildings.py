@@ -1,10 +1,12 @@
-"""Cost of the run of a building: prints the tables of docs/buildings.md.
+"""Cost of the run of a building: prints the tables of docs/buildings.md, and one of docs/performance.md.
 
 `python benchmarks/buildings.py` measures cost over the number of bearings, and a hundred bearings under a record of 60 s;
 `python benchmarks/buildings.py opensees` time and error beside OpenSees with its own triple pendulum (needs
 openseespy); `python benchmarks/buildings.py ringing` what damping of the interfaces does to the dependence of rotations
-on the tolerance; `python benchmarks/buildings.py slab` a flexible slab beside a rigid one. The record is that of the preset ridgecrest-clc. Seconds are those of the processors; with two threads also
-those of the clock.
+on the tolerance; `python benchmarks/buildings.py slab` a flexible slab beside a rigid one; `python
+benchmarks/buildings.py loaded` one thread, two threads and the chosen threads beside processes that the script starts.
+The record is that of the preset ridgecrest-clc. Seconds are those of the processors; with two threads also those of the
+clock.
 """
 
 from __future__ import annotations
@@ -13,7 +15,10 @@ import json
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from os import getloadavg
 from pathlib import Path
 from typing import Any
 
@@ -95,8 +100,8 @@ def tower(count: int, duration: float, solver: Solver | None = None, storeys: in
     return BuildingScene(frame(parts), bearings, record(duration)[1], solver or Solver())
 
 
-def timed(scene: BuildingScene, threads: int = 1) -> tuple[BuildingResult, float, float]:
-    """The result, and seconds of the processors and of the clock, without the building of the model."""
+def timed(scene: BuildingScene, threads: int | None = 1) -> tuple[BuildingResult, float, float]:
+    """The result, and seconds of the processors and of the clock, without the building of the model. threads: None: chosen."""
     run = start_building_run(scene, threads)
     begin, clock = time.process_time(), time.perf_counter()
     while run.run.advance(1000):
@@ -120,6 +125,31 @@ def scaling() -> None:
             f"{largest_count} bearings, {storeys} storeys, {duration:g} s, threads {threads}: {result.counters['steps']} steps, {seconds:.1f} s of the processors, "
             f"{clock:.1f} s of the clock; bearings {1e3 * largest:.0f} mm"
         )
+
+
+@contextmanager
+def busy(processes: int) -> Iterator[None]:
+    """So many processes that compute all the time, in the block."""
+    started = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(processes)]
+    try:
+        yield
+    finally:
+        for each in started:
+            each.kill()
+            each.wait()
+
+
+def loaded() -> None:
+    """Print the time of a building on one thread, on two and on the chosen ones, in turn, beside busy processes."""
+    scene, rounds = tower(pick(16, 4), pick(20.0, 0.5)), pick(3, 1)
+    print("| busy processes | load average | one thread [s] | two threads [s] | as chosen [s] | chosen over one |")
+    print("|---|---|---|---|---|---|")
+    for processes in (0, 1, 2, 4):
+        with busy(processes):
+            taken = [[timed(scene, threads)[2] for threads in (1, 2, None)] for _ in range(rounds)]
+            load = getloadavg()[0]
+        one, two, chosen = np.median(taken, axis=0)
+        print(f"| {processes} | {load:.1f} | {one:.2f} | {two:.2f} | {chosen:.2f} | {chosen / one:.2f} |", flush=True)
 
 
 # Dao's example: shallow geometry times four and friction over three, so that tilts are small as the element assumes.
@@ -327,15 +357,11 @@ def slab() -> None:
 
 if __name__ == "__main__":
     options = parser(__doc__)
-    tables = ("scaling", "opensees", "ringing", "slab")
-    options.add_argument("table", nargs="?", choices=tables, help="only this one; default: scaling")
+    tables = {"scaling": scaling, "ringing": ringing, "slab": slab, "loaded": loaded}
+    options.add_argument("table", nargs="?", choices=[*tables, "opensees"], help="only this one; default: scaling")
     chosen = options.parse_args().table
-    if chosen == "ringing":
-        ringing()
-    elif chosen == "slab":
-        slab()
-    elif chosen != "opensees":
-        scaling()
+    if chosen != "opensees":
+        tables[chosen or "scaling"]()
     compared = chosen == "opensees" or (QUICK and chosen is None)
     if compared and installed("openseespy.opensees", "four bearings beside OpenSees"):
         beside_opensees(4, pick(12.0, 1.0))

@@ -303,11 +303,11 @@ class BuildingRun:
         self.replace(member, change)
 
 
-def start_building_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
+def start_building_run(scene: BuildingScene, threads: int | None = None, cores: int | None = None) -> BuildingRun:
     """The run of a scene before its first step.
 
-    threads: for the bearings; None: as many as there are processors, with eight bearings each, while that is faster
-    than one by the clock. Results do not depend on it. Raises InputError, RunError.
+    threads: for the bearings; None: one for each of the cores, with eight bearings each, while that is faster than one
+    by the clock. Results do not depend on it. cores: None: all of this process. Raises InputError, RunError.
     """
     members = [RunningBearing.of(scene, index, effects) for index, effects in enumerate(scene.modelled)]
     grounds, ground_of = scene.grounds
@@ -343,7 +343,7 @@ def start_building_run(scene: BuildingScene, threads: int | None = None) -> Buil
         max_steps=float(solver.max_steps),
         end=scene.end,
         output_step=scene.row_step,
-        threads=_threads(threads, len(members)),
+        threads=_threads(threads, cores, len(members)),
         timed=threads is None,
     )
     keys = [key, *(member.model.info.key for member in members)]
@@ -403,9 +403,8 @@ def _models(specs: Sequence[ModelSpec]) -> str:
     return ", ".join(f"{len([*same])} x {key}" for key, same in groupby(spec.key for spec in specs))
 
 
-def _threads(threads: int | None, bearings: int) -> int:
-    if threads is None:
-        return max(1, min(usable_cores(), bearings // BEARINGS_OF_A_THREAD))
-    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        raise InputError(f"threads = {threads!r}: give a whole number of at least 1")
-    return threads
+def _threads(threads: int | None, cores: int | None, bearings: int) -> int:
+    for name, given in (("threads", threads), ("cores", cores)):
+        if given is not None and (isinstance(given, bool) or not isinstance(given, int) or given < 1):
+            raise InputError(f"{name} = {given!r}: give a whole number of at least 1")
+    return threads or max(1, min(cores or usable_cores(), bearings // BEARINGS_OF_A_THREAD))

@@ -67,7 +67,7 @@ class BuildingScene(Printed, OtherSystem):
     Raises InputError: inconsistent parts, or weights that the bearings do not balance.
     """
 
-    run_options: ClassVar[frozenset[str]] = frozenset({"threads"})
+    run_options: ClassVar[frozenset[str]] = frozenset({"threads", "cores"})
     energy_compared: ClassVar[tuple[str, str]] = (
         "the work of the bearings on the building was compared with its kinetic, elastic and damped energy",
         "largest",

@@ -59,7 +59,7 @@ def simulate(  # noqa: D417 - the docstring lists the options one by one
     ----------
     scene
         The scene of a bearing (`Scene`), of a building (`BuildingScene`), or another system. The options from `strict`
-        to `gradient_errors` are for a bearing, `threads` is for a building.
+        to `gradient_errors` are for a bearing, `threads` and `cores` are for a building.
     progress
         Called repeatedly with the time reached and the end of the run [s]. An exception in it ends the run.
     checkpoint
@@ -81,6 +81,8 @@ def simulate(  # noqa: D417 - the docstring lists the options one by one
         tenth of its tolerance.
     threads
         Number of threads for the bearings of a building; None: chosen. Results do not depend on it.
+    cores
+        Number of cores for the threads that are chosen; None: all that this process may use.
 
     Returns
     -------

@@ -88,13 +88,13 @@ def completed_runs(
             if strict and "strict" not in scene.run_options:
                 raise InputError("strict: only runs of one bearing have it; leave it out")
     report = None if progress is None else SharedProgress(len(scenes), progress).of
-    threads = 1 if min(count, len(scenes)) >= usable_cores() else None  # of a building; None: it chooses
+    cores = max(1, usable_cores() // max(1, min(count, len(scenes))))  # of each run
 
     def results() -> Generator[tuple[int, Any], None, None]:
         build_models(scenes)
         # Long runs start first, so that all workers end at about the same time.
         order = sorted(range(len(scenes)), key=lambda index: -scenes[index].end)
-        calls = ((index, (labels[index], scenes[index], strict, threads)) for index in order)
+        calls = ((index, (labels[index], scenes[index], strict, cores)) for index in order)
         with local_pool(count) as pool:
             yield from pool.results(_run, calls, report)
 
@@ -114,11 +114,12 @@ class _OutOfTime(KeyboardInterrupt):
 def run_to_end(scene: Any, *, seconds: float | None = None, **options: Any) -> Any:
     """Run one scene of a batch or a study; a run that fails after its first row returns its result too.
 
-    options: of `simulate`. seconds: longest wall time of the run, without builds [s]; None: no limit. Raises
-    InputError as `simulate`; RunError: there are no rows, or the time is over (status "limit"; `.result` has the rows
-    until then).
+    options: of `simulate`, for the scenes that have them. seconds: longest wall time of the run, without builds [s];
+    None: no limit. Raises InputError as `simulate`; RunError: there are no rows, or the time is over (status "limit";
+    `.result` has the rows until then).
     """
     begin, expired = working_time(), False
+    options = {name: value for name, value in options.items() if name in scene.run_options}
 
     def progress(reached: float, end: float) -> None:
         nonlocal expired
@@ -149,13 +150,11 @@ def _located(label: str) -> Iterator[None]:
         raise RunError(f"{label}: {error}", status=error.status, result=error.result) from error
 
 
-def _run(label: str, scene: System, strict: bool, threads: int | None) -> Any:
+def _run(label: str, scene: System, strict: bool, cores: int) -> Any:
     """The result of one run of a batch, in a worker; its RunError if it has no rows."""
     try:
         with _located(label):
-            options = {"strict": strict, "threads": threads}
-            options = {name: value for name, value in options.items() if name in scene.run_options}
-            return run_to_end(scene, **options)
+            return run_to_end(scene, strict=strict, cores=cores)
     except RunError as error:
         return error
     except InputError as error:  # such as: other runs leave no memory for its rows

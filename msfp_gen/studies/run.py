@@ -225,7 +225,7 @@ def _row(make: Callable[[], System], job: ChunkJob, at: dict[str, float]) -> tup
     try:
         scene = make()
         scene.check_method()
-        result = run_to_end(scene, seconds=job.run_seconds)
+        result = run_to_end(scene, seconds=job.run_seconds, cores=1)
     except InputError as error:
         return BAD_INPUT, str(error), {}
     except RunError as error:  # a run without rows, or out of time: its rows would depend on the computer

@@ -22,9 +22,9 @@ FAST = {"README.md", "fenz-test2"}
 def test_the_stated_error_of_presets_and_examples_holds(name: str) -> None:
     """Of README's scene, the examples and all presets, whose ringing is not damped."""
     scene = dict(chain(promises.own(), promises.all_presets()))[name]
-    tight = promises.TIGHT if name in OWN else promises.RESOLVED
+    options = {} if name in OWN else promises.OF_PRESETS
     try:
-        found = promises.promise(name, scene, tight=tight)
+        found = promises.promise(name, scene, **options)
     except RunError as error:
         assert name not in FAST and error.status == "accuracy", error
         return

@@ -2,16 +2,17 @@
 
 A reference run by a method of other stages, at a tenth of the tolerance, estimates the error. Its steps are at most
 half the mean step. Where nothing damps the ringing of stuck sliders, its tolerance is so small that it resolves what
-the other runs filter. Where this ringing exceeds the target, or there is no time for such a run, no error is stated,
-but what the ringing changes in this scene is. SAFETY covers the error of the reference run; docs/accuracy.md compares
-such estimates with true errors. Half of the requested error is for effect selection, half for the method.
+the other runs filter, and a run by the default method, which resolves the ringing too, confirms it. Where this ringing
+exceeds the target, where these two runs differ by more than a tenth of it, or where there is no time for them, no error
+is stated, but what the ringing changes in this scene is. SAFETY covers the error of the reference run; docs/accuracy.md
+compares such estimates with true errors. Half of the requested error is for effect selection, half for the method.
 """
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from math import pi
+from math import inf, pi
 from typing import TYPE_CHECKING, Any, Final
 
 from msfp_gen.common.aliases import Progress
@@ -39,8 +40,9 @@ CANDIDATE_TOLERANCES = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21
 REFERENCE_OFFSET = 2  # candidates from a tolerance to the tolerance of its reference run: a factor of ten
 STEPS_PER_PERIOD = 40  # of a reference run in the period of a damped slider
 MOST_STEPS = 200_000  # of such a run: some seconds; longer runs do without
-RESOLVING = 1e-7  # tolerance of a reference run that resolves undamped ringing
-RESOLVING_SHARE = 0.5  # of the time left, which that run may take
+RESOLVING, CONFIRMING = 1e-8, 1e-7  # tolerances of a reference run that resolves undamped ringing, and of a second one
+RESOLVING_SHARE = 0.5  # of the time left, which each of them may take
+KNOWN = 0.1  # of the target: what these two runs may differ by
 SAFETY = 1.5  # factor on the difference from the reference run, which has an error of its own
 DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays
 STAGNATION_RATIO = 0.7  # ratio of errors over two candidates above which the tolerance is not their cause
@@ -275,7 +277,7 @@ class _Search:
         """The reference run of the run at a candidate tolerance. Raises RunError as `trial`."""
         if index not in self.references:
             tolerance = CANDIDATE_TOLERANCES[index + REFERENCE_OFFSET]
-            self.filtered = self.filtered or (self.rings and not self.resolved.finished)
+            self.filtered = self.filtered or (self.rings and self.doubt > KNOWN * self.target)
             if self.rings and not self.filtered and tolerance >= RESOLVING:
                 self.references[index] = self.resolved
             else:
@@ -301,6 +303,15 @@ class _Search:
         return run_native(
             REFERENCE_METHOD, self.reference_scene, RESOLVING, RESOLVING_SHARE * self._remaining, repeats=0
         )
+
+    @cached_property
+    def doubt(self) -> float:
+        """Difference of `resolved` from a run by the other method [-]; infinite where one of the two did not end."""
+        if not self.resolved.finished:
+            return inf
+        second = run_native(METHOD, self.reference_scene, CONFIRMING, RESOLVING_SHARE * self._remaining, repeats=0)
+        found = errors(second, self.resolved) if second.finished else None
+        return inf if found is None else found.largest
 
     @property
     def _remaining(self) -> float:
@@ -376,14 +387,14 @@ class _Search:
             close = index not in self.references and reference is not None and reference.rtol > 0.2 * trial.rtol
             factor = 2 * SAFETY if close else SAFETY
             estimate = factor * differences.largest
-            if self.filtered and (ringing := self._error_of_ringing(index)) <= self.target:
-                estimate = max(estimate, ringing)
+            if self.rings and (not self.filtered or self._error_of_ringing(index) <= self.target):
+                estimate = max(estimate, self._error_of_ringing(index))
         return Attempt(trial.method, trial.rtol, trial.seconds, trial.newton, estimate, differences, trial.status)
 
     def _error_of_ringing(self, index: int) -> float:
-        """Estimated error of a run against the one that resolves undamped ringing; infinite where that did not end."""
-        found = errors(self.trial(index), self.resolved) if self.resolved.finished else None
-        return float("inf") if found is None else SAFETY * found.largest
+        """Estimated error of a run against one that resolves undamped ringing; infinite where none is confirmed."""
+        found = errors(self.trial(index), self.resolved) if self.doubt <= KNOWN * self.target else None
+        return inf if found is None else found.largest + max((SAFETY - 1) * found.largest, self.doubt)
 
     def next_step(self, index: int) -> Attempt | None:
         """The attempt at the next tighter tolerance, run where needed; None if there is no time for it."""
@@ -407,7 +418,8 @@ class _Search:
         if self.reference_scene is not self.scene:
             text += " with every effect"
         if self.rings and not self.filtered:
-            text += f", which resolves {self._ringing}"
+            confirmed = f"{METHOD} at rtol {CONFIRMING:g} is within {share(self.doubt)} of it"
+            text += f", which resolves {self._ringing}; {confirmed}"
         if looser and (self.attempt(looser[-1]).estimate or 0.0) <= self.target:
             return method, f"{text}; looser tolerances meet the target too, but lose more iterations to rejected steps"
         if not looser:
@@ -429,7 +441,10 @@ class _Search:
             if found
             else "no run resolved it"
         )
-        remedy = "give contact_damping" + ("" if resolved.finished else " or a larger budget")
+        second, remedy = "no second run confirmed it in time", "give contact_damping or a larger budget"
+        if self.doubt < inf:
+            second, remedy = f"a second such run by {share(self.doubt)} from the first", "give contact_damping"
+        effect += f", and {second}" if resolved.finished else ""
         return f"{self._ringing}, which nothing damps: {effect}; {remedy}"
 
     @property

@@ -11,7 +11,19 @@ import numpy as np
 import pytest
 from support.buildings import BEARING, INTERFACE, LOAD, MOTION, frame, scene
 
-from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, InputError, Motion, RunError, simulate
+from msfp_gen import (
+    BaseSlab,
+    Building,
+    BuildingBearing,
+    BuildingScene,
+    Effects,
+    InputError,
+    Motion,
+    RunError,
+    simulate,
+    simulate_batch,
+)
+from msfp_gen.buildings import run as run_of_building
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.run import CompiledBuildingRun, building_result, start_building_run
 
@@ -34,6 +46,21 @@ def test_results_do_not_depend_on_the_way_that_the_clock_chooses(monkeypatch):
     monkeypatch.setattr("msfp_gen.buildings.run.usable_cores", lambda: 3)
     one, chosen = simulate(EVENTFUL, threads=1), simulate(EVENTFUL)
     assert same(one, chosen) and one.counters == chosen.counters
+
+
+@pytest.mark.parametrize(("workers", "count", "threads"), [(2, 3, 2), (1, 2, 4), (4, 2, 2), (5, 5, 1), (7, 7, 1)])
+def test_buildings_of_a_batch_share_the_cores(workers, count, threads, monkeypatch):
+    """Runs at the same time by threads of each are at most the cores, or one thread for each run that was asked for."""
+    monkeypatch.setattr("msfp_gen.buildings.run.BEARINGS_OF_A_THREAD", 1)  # of its four bearings
+    monkeypatch.setattr("msfp_gen.studies.batch.usable_cores", lambda: 5)
+    real, found = run_of_building._threads, []
+    monkeypatch.setattr(run_of_building, "_threads", lambda *given: found.append(real(*given)) or found[-1])
+    scenes = [replace(EVENTFUL, duration=0.1 + 0.02 * k) for k in range(count)]
+    results = simulate_batch(scenes, workers=workers)
+    assert found == count * [threads] and (threads == 1 or min(workers, count) * threads <= 5)
+    for made, result in zip(scenes, results, strict=True):
+        alone = simulate(made, threads=1)
+        assert result.scene is made and same(alone, result) and alone.counters == result.counters
 
 
 @pytest.mark.parametrize("effects", [None, Effects(uplift=True)], ids=["default", "uplift"])
@@ -92,10 +119,11 @@ def test_the_compiled_run_refuses_a_snapshot_of_another_building():
     start_building_run(short, threads=2).run.restore(snapshot)
 
 
-@pytest.mark.parametrize("threads", [0, 1.5, True, "two"])
-def test_a_wrong_number_of_threads_is_refused(threads):
-    with pytest.raises(InputError, match=rf"threads = {threads!r}: give a whole number of at least 1"):
-        simulate(EVENTFUL, threads=threads)
+@pytest.mark.parametrize("option", ["threads", "cores"])
+@pytest.mark.parametrize("number", [0, 1.5, True, "two"])
+def test_a_wrong_number_of_threads_is_refused(option, number):
+    with pytest.raises(InputError, match=rf"{option} = {number!r}: give a whole number of at least 1"):
+        simulate(EVENTFUL, **{option: number})
 
 
 def test_rows_lie_at_even_times_and_steps_end_at_samples():

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from msfp_gen import Auto, BuildingScene, Effects, InputError, bound, changed_scene, simulate, study
+from msfp_gen.buildings import run as run_of_building
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.cli import main
 from msfp_gen.results.result import load_result
@@ -150,7 +151,7 @@ values = [0.02]
 """
 
 
-def test_a_study_takes_a_building(path: Path, tmp_path: Path):
+def test_a_study_takes_a_building(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     parquet = pytest.importorskip("pyarrow.parquet")
     file = tmp_path / "study.toml"
     file.write_text(STUDY, encoding="utf-8")
@@ -160,7 +161,11 @@ def test_a_study_takes_a_building(path: Path, tmp_path: Path):
     assert [s.friction for s in scene.bearings[0].bearing.surfaces] == pytest.approx([0.036, 0.017, 0.017, 0.1284])
     assert scene.bearings[1].bearing.surfaces[1].friction == 0.02
     assert scene.bearings[2].interface.vertical_stiffness == 5e7
+    monkeypatch.setattr("msfp_gen.buildings.run.BEARINGS_OF_A_THREAD", 1)
+    real, threads = run_of_building._threads, []
+    monkeypatch.setattr(run_of_building, "_threads", lambda *given: threads.append(real(*given)) or threads[-1])
     outcome = study(file, tmp_path / "runs", workers=1)
+    assert threads == [1, 1], "workers of a study may be anywhere, so that a run takes one core"
     assert outcome.runs == outcome.done == 2 and outcome.failed == 0
     rows = parquet.read_table(next((tmp_path / "runs").glob("part-*.parquet"))).to_pydict()
     run = simulate(scene)
