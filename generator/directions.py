@@ -105,7 +105,7 @@ def _written(call: Call, program: Program, blocks: Blocks) -> dict[str, Entry]:
 
 
 def _solved(call: Call, program: Program, along: Directions) -> set[str]:
-    """The results of which the solution of a call needs the derivatives: those in its equations."""
+    """The results in the equations of a call that the runtime solves, whose derivatives its solution needs."""
     if not isinstance(call.by, Solve):
         return set()
     if along.name not in call.by.emitted:  # the runtime differentiates it by all inputs
@@ -160,7 +160,7 @@ def _moving(every: list[tuple[Call, Program]], blocks: Blocks, seeds: Seeds | No
 
 
 def _read(every: list[tuple[Call, Program]], blocks: Blocks, moving: set[Entry], along: Directions) -> set[Entry]:
-    """The entries of which something reads the derivatives: a result, another program, or the solution of a call."""
+    """The entries whose derivatives something reads: a result, another program, or the solution of a call."""
     lists = {list_name(place) for call, _ in every for place in call.reads}
     read: set[Entry] = set()
     for call, program in every:

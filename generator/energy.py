@@ -179,8 +179,8 @@ def works(b: Blocks, rims: bool, uplift: bool) -> Program:
 
 
 def tilt(b: Blocks) -> Program:
-    """Tilt of a body in the plane, of which the sum is that of the top plate."""
-    p = Program("tilt", "tilt of a body in the plane")
+    """Tilt of a body relative to the body below, in the plane; their sum is the tilt of the top plate."""
+    p = Program("tilt", "tilt of a body relative to the body below")
     x: Symbols = p.read(b.coordinates, "x")
     p.write(b.tilt, {"theta": x["theta"]})
     return p

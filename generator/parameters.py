@@ -168,7 +168,7 @@ def top_block(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> Program
 
 
 def seat_compliance(b: Blocks, scene_values: ValueBlocks) -> Program:
-    """Compliance of a unilateral contact, of which a stack has one for each surface in series (docs/uplift.md)."""
+    """Compliance of a unilateral contact; the contacts of a stack act in series (docs/uplift.md)."""
     p = Program("seat_compliance", "compliance of a unilateral contact")
     v: Symbols = p.read(scene_values.surface_values, "v")
     p.write(b.compliance, {"compliance": 1 / v["seat_stiffness"]})

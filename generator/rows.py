@@ -16,7 +16,7 @@ def extreme_length(b: Blocks) -> Program:
 
 
 def bounded_friction(b: Blocks) -> Program:
-    """Y, Z of an interpolated row, which has left the unit disc, scaled to the size of those of another row."""
+    """Y, Z of an interpolated row, which has left the unit disc, scaled to the size in another row."""
     p = Program("bounded_friction", "Y, Z scaled to the size of others, where interpolation has made them larger")
     own: Symbols = p.read(b.friction, "f")
     most: Symbols = p.read(b.friction, "m")
