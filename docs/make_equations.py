@@ -15,7 +15,8 @@ from msfp_gen.common.tables import markdown_table
 from msfp_gen.generator import body, contact, energy, laws, parameters, top, two_port
 from msfp_gen.generator.derive import derive
 from msfp_gen.generator.latex import statements, to_latex
-from msfp_gen.generator.schedule import If, Over, Pass, condensed, momentum_balances, passes_of
+from msfp_gen.generator.places import If, Over, Pass, passes_of
+from msfp_gen.generator.schedule import condensed, momentum_balances
 from msfp_gen.generator.schedule import two_port as ends
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
@@ -68,7 +69,8 @@ stack.
   and 1 otherwise.
 - Friction over a slip is of planar models without masses. In a step of such a model the body above turns by
   $\alpha + \beta\,\Delta\omega'$, $Y^0$ and $Y^1$ are $Y$ at its ends and $\bar{N}$ is the mean normal force. $W_f$ is
-  the work [J] that friction stores and $W_d$ the work that it dissipates.
+  the work [J] that friction stores and $W_d$ the work that it dissipates. $W_E$ is the work of the load, by its values
+  and by displacement $u$ and tilt $\vartheta$ of the top plate at both ends of the step.
 - $\eta_V$ is 1 without uplift; with it it is the compliance of the vertical spring and of the unilateral contacts
   over the compliance of the spring.
 - $x_1, x_2, \dots$ are local intermediate values of a program."""
@@ -81,8 +83,8 @@ differentiates it by parameters, program by program. Bodies are numbered 1 to n 
 $\gamma$ lies between bodies $\gamma$ and $\gamma+1$. Given are the coordinates `x`, the inertial `frame` with the
 translation of the base, `load_force` and `load_moment` on the top plate and, where a mass rests on a vertical spring,
 its `foot_stage`. The programs follow below, but for those that only gather, add or copy: `rim_coordinates`,
-`surface_moment`, `balances`, and with uplift `surface_force`, `split_moment`, `wrench_above`, `excess_force`,
-`contact_excess`."""
+`surface_moment`, `balances`, `report_rates`, `surface_results`, and with uplift `surface_force`, `split_moment`,
+`wrench_above`, `excess_force`, `contact_excess`."""
 
 CONDENSED = """### The condensed equations
 
@@ -152,6 +154,7 @@ TITLES = {
     "upper_wrench": "Wrench of the upper end",
     "friction_after_slip": "Friction over the slip of a step in closed form: (3.18) integrated, (3.19)",
     "slip_work": "Work of friction over that slip",
+    "load_work": "Work of the load over a step of such a model",
 }
 
 

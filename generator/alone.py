@@ -23,20 +23,9 @@ from .drivers import LENGTHS, Printer, form_of
 from .emit import function
 from .interface import effects_text, environment, surface_values
 from .lower import lower
+from .places import LISTS, Call, List, ListStorage, Over, Pass, Per, passes_of
 from .program import Block, Program
-from .schedule import (
-    LISTS,
-    Call,
-    List,
-    ListStorage,
-    Over,
-    Pass,
-    Per,
-    condensed,
-    momentum_balances,
-    passes_of,
-    unknowns,
-)
+from .schedule import condensed, momentum_balances, results, unknowns
 
 WIDTH = 8  # columns of a Jacobian that are computed at once
 FILES = ("kernels.h", "equations.h", "equations.c")
@@ -107,11 +96,11 @@ class _Layout:
         surfaces = range(layout.surfaces)
         rates = [entry.name for entry in blocks.friction.fields]
         rows = [self.place("balances", j + 1, entry.name) for j in surfaces for entry in blocks.balances.fields]
-        rows += [self.place("report_contact", j, f"d{name}") for j in surfaces for name in rates]
+        rows += [self.place("report_rates", j, f"d{name}") for j in surfaces for name in rates]
         moments = [entry.name for entry in blocks.angular.fields][: len(self.equations.unknown_angles)]
         left = [self.place("angular", j + 1, entry) for j in surfaces for entry in moments]
-        left += [self.place("contact", j, f"d{name}") for j in surfaces for name in rates]
-        left += [self.place("contact", j, "N") for j in surfaces]
+        left += [self.place("surface_results", j, f"d{name}") for j in surfaces for name in rates]
+        left += [self.place("surface_results", j, "N") for j in surfaces]
         turning = [
             self.place("body", k, f"{name}{axis}")
             for k in range(layout.n)
@@ -134,7 +123,8 @@ def _schedules(spec: ModelSpec) -> dict[str, tuple[Pass, ...]]:
             if calls:
                 yield Pass(Over.SURFACES if one.over is Over.TOGETHER else one.over, calls)
 
-    forms = {"balances": momentum_balances(spec.effects), "condensed": condensed(spec.effects)}
+    effects = spec.effects
+    forms = {"balances": momentum_balances(effects), "condensed": {**condensed(effects), **results()}}
     return {name: tuple(alone(passes_of(schedule))) for name, schedule in forms.items()}
 
 

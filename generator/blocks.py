@@ -80,6 +80,7 @@ class Blocks:
 
     body_parameters: Block
     surface_parameters: Block
+    compliance: Block
     top_parameters: Block
     coordinates: Block
     body: Block
@@ -96,9 +97,14 @@ class Blocks:
     slip_end: Block
     friction_end: Block
     slip_work: Block
+    tilt: Block
+    load_end: Block
+    load_work: Block
     unknowns: Block
     contact: Block
+    surface_results: Block
     report_contact: Block
+    friction_rates: Block
     rim: Block
     rim_coordinates: Block
     rim_wrench: Block
@@ -116,6 +122,8 @@ class Blocks:
     angular: Block
     balances: Block
     points: Block
+    pair: Block
+    length: Block
     base_motion: Block
     energy: Block
     unilateral: Block
@@ -135,6 +143,16 @@ class Blocks:
     end_wrench: Block
     coefficient: Block | None = None
     """The friction coefficient as an unknown, where it follows a law."""
+    memory: Block | None = None
+    """A part of what a surface remembers, before a stage."""
+    memory_part: Block | None = None
+    """The constants of that part."""
+    diagonal: Block | None = None
+    """The diagonal entry of the stage formula, in which a memory is solved for."""
+    memory_end: Block | None = None
+    """The part and its rate at the end of a stage."""
+    memory_past: Block | None = None
+    memory_gain: Block | None = None
 
 
 def _parameters(new: Maker) -> dict[str, Block]:
@@ -164,6 +182,7 @@ def _parameters(new: Maker) -> dict[str, Block]:
         .scalar("ca", "-", "cosine of the half-angle of the footprint, friction angle included")
         .scalar("sa", "-", "sine of that angle")
         .build(),
+        "compliance": new("compliance").scalar("compliance", "m/N", "of the unilateral contact of a surface").build(),
     }
 
 
@@ -212,6 +231,8 @@ def _motion(new: Maker, uplift: bool) -> dict[str, Block]:
         .scalar("ct", "-", "cos theta")
         .build(),
         "points": _points(new),
+        "pair": new("pair").scalar("x", "-", "a number of a row").scalar("y", "-", "a second one, or 0").build(),
+        "length": new("length").scalar("value", "-", "length of a pair").build(),
         "base_motion": new("base_motion")
         .vector("U", "m/s", "velocity of the base", POLAR)
         .vector("B", "m/s^2", "acceleration of the base", POLAR)
@@ -292,6 +313,14 @@ def _interfaces(new: Maker) -> dict[str, Block]:
         .scalar("stored", "J", "stored in the step")
         .scalar("lost", "J", "dissipated by plastic slip in the step")
         .build(),
+        "load_end": new("load_end")
+        .vector("F", "N", "force of the load at one end of a step", POLAR)
+        .vector("M", "N m", "its moment", AXIAL)
+        .vector("d", "m", "r_nn from the base", POLAR)
+        .scalar("tilt", "rad", "tilt of the top plate")
+        .build(),
+        "tilt": new("tilt").scalar("theta", "rad", "theta of a body, of the top plate their sum").build(),
+        "load_work": new("load_work").scalar("work", "J", "work of the load over a step").build(),
         "unknowns": new("unknowns")
         .scalar("psi", "rad", "psi~, first angle of the normal's position (2.85)", 0)
         .scalar("theta", "rad", "theta~, second angle of the normal's position")
@@ -315,6 +344,15 @@ def _interfaces(new: Maker) -> dict[str, Block]:
         .scalar("YZ", "1/s", "d(dY/dt)/dZ", 0)
         .scalar("ZY", "1/s", "d(dZ/dt)/dY", 0)
         .scalar("ZZ", "1/s", "d(dZ/dt)/dZ", 0)
+        .build(),
+        "surface_results": new("surface_results")
+        .scalar("dY", "1/s", "dY/dt (3.18)")
+        .scalar("dZ", "1/s", "dZ/dt (3.18)", 0)
+        .scalar("N", "N", "normal force")
+        .build(),
+        "friction_rates": new("friction_rates")
+        .scalar("dY", "1/s", "dY/dt (3.18)")
+        .scalar("dZ", "1/s", "dZ/dt (3.18)", 0)
         .build(),
         "report_contact": new("report_contact")
         .vector("p", "N", "N + F_f, basis of the body below (3.15)-(3.17)", POLAR)

@@ -15,7 +15,7 @@ from msfp_gen.specification.friction_laws import Spin
 from . import laws
 from .blocks import Blocks
 from .body import tilted_axis
-from .functions import ArcTan2, Modulus, Select
+from .functions import ArcTan2, Length, Modulus, Select
 from .laws import Shear, friction_rates
 from .program import Program, Symbols, Vector, add, combine, cross, derivative, dot, project, scale
 
@@ -166,6 +166,25 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
         slopes=[name for name in slopes if name in b.contact.quantities],  # in a plane the law has no slope along Z
     )
     p.lanes = "MSFP_LANES"
+    p.unknowns = {g[n]: stage[n] + stage["tau"] * p.results[f"d{n}"] for n in ("Y", "Z") if g[n].is_Symbol}
+    if law is not None:
+        p.unknowns[unknown["mu"]] = p.results["mu"]
+    return p
+
+
+def surface_results(b: Blocks) -> Program:
+    """What a run takes of a contact beside its moment."""
+    p = Program("surface_results", "rates of the friction state and normal force of a contact")
+    c: Symbols = p.read(b.contact, "c")
+    p.write(b.surface_results, {name: c[name] for name in ("dY", "dZ", "N")})
+    return p
+
+
+def report_rates(b: Blocks) -> Program:
+    """Rates of the friction state by the balances as PEER 2017/07 states them."""
+    p = Program("report_rates", "rates of the friction state (3.18)")
+    c: Symbols = p.read(b.report_contact, "c")
+    p.write(b.friction_rates, {name: c[name] for name in ("dY", "dZ")})
     return p
 
 
@@ -224,7 +243,7 @@ def gap_at(b: Blocks) -> Program:
 
 def _gap(p: Program, b: Blocks, par: Symbols, psi: tuple[sp.Expr, sp.Expr], theta: tuple[sp.Expr, sp.Expr]) -> Program:
     """psi, theta: sine and cosine. The arccos is written as an atan2, which is exact at zero tilt."""
-    sine = p.let(norm(theta[0], p.let(psi[0] * theta[1])))
+    sine = p.let(Length(theta[0], p.let(psi[0] * theta[1])))
     s = p.let(par["R"] * ArcTan2(sine, p.let(psi[1] * theta[1])))
     p.write(b.gap, {"s": s, "g": par["sc"] - s})
     return p

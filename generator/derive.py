@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from msfp_gen.specification.layout import ModelSpec
 
-from . import body, columns, contact, energy, laws, parameters, top, two_port, unilateral
+from . import body, columns, contact, energy, laws, parameters, rows, top, two_port, unilateral
 from .blocks import Blocks, make_blocks
 from .program import Program
 
@@ -68,6 +68,8 @@ def derive(spec: ModelSpec) -> Equations:
         body.slip_rotation(blocks),
         contact.report_contact(blocks, friction_model),
         contact.report_wrench(blocks, effects.rims),
+        contact.surface_results(blocks),
+        contact.report_rates(blocks),
         contact.contact_stage(blocks),
         contact.surface_moment(blocks, effects.rims),
         body.moment_to_world(blocks),
@@ -85,12 +87,15 @@ def derive(spec: ModelSpec) -> Equations:
         contact.gap(blocks),
         contact.gap_at(blocks),
         *energy.programs(blocks, effects.rims, effects.uplift, effects.top_rotation),
+        *rows.programs(blocks),
         *(two_port.programs(blocks) if effects.permits_moving_ends else ()),
+        *(laws.memory_programs(blocks, effects.law.memory) if effects.law and effects.law.memory else ()),
     ]
     if effects.top_rotation:
         programs.append(top.upright(blocks))
     if effects.permits_quasistatic_steps:
         programs += [laws.friction_after_slip(blocks, effects.bouc_wen), laws.slip_work(blocks, effects.bouc_wen)]
+        programs += [energy.tilt(blocks), energy.load_end(blocks), energy.load_work(blocks)]
     if effects.rims:
         programs += [contact.rim_coordinates(blocks), contact.rim(blocks)]
     if effects.uplift:

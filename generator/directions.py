@@ -15,10 +15,8 @@ import sympy as sp
 
 from .blocks import Blocks
 from .lower import directional, moving_symbols, symbol_of, symbols_read
-from .program import Program, Use, fields_of
-from .schedule import (
+from .places import (
     LISTS,
-    VARIABLES,
     Call,
     ListStorage,
     Schedule,
@@ -29,6 +27,8 @@ from .schedule import (
     output_is_stored,
     passes_of,
 )
+from .program import Program, Use, fields_of
+from .schedule import VARIABLES
 
 COLUMNS = "MSFP_DOF"
 """C constant with the number of variables of a step whose derivatives one call carries."""
@@ -80,7 +80,7 @@ def directed(
     ]
     every = [(call, programs[name]) for call in calls for name in call.programs]
     moving = None if along.parameters else _moving(every, blocks, along.seeds)
-    read = None if moving is None else _read(every, blocks, moving)
+    read = None if moving is None else _read(every, blocks, moving, along)
     found: dict[str, Program] = {}
     for call, program in every:
         if isinstance(call.by, Solve) and along.name not in call.by.emitted:
@@ -102,6 +102,16 @@ def _written(call: Call, program: Program, blocks: Blocks) -> dict[str, Entry]:
     assert program.output is not None
     entries = [(list_name(place), field.name) for place in call.writes for field in block_of(place, blocks).fields]
     return {field.name: entry for field, entry in zip(program.output.block.fields, entries, strict=True)}
+
+
+def _solved(call: Call, program: Program, along: Directions) -> set[str]:
+    """The results in the equations of a call that the runtime solves, whose derivatives its solution needs."""
+    if not isinstance(call.by, Solve):
+        return set()
+    if along.name not in call.by.emitted:  # the runtime differentiates it by all inputs
+        return set(program.results)
+    read = {s for equal in program.unknowns.values() for s in equal.free_symbols}
+    return {name for name, value in program.results.items() if value in read}
 
 
 def _input(use: Use, lists: set[str], moving: set[Entry] | None) -> Use:
@@ -149,13 +159,13 @@ def _moving(every: list[tuple[Call, Program]], blocks: Blocks, seeds: Seeds | No
     return moving
 
 
-def _read(every: list[tuple[Call, Program]], blocks: Blocks, moving: set[Entry]) -> set[Entry]:
-    """The entries of which something reads the derivatives: a result, another program or the runtime."""
+def _read(every: list[tuple[Call, Program]], blocks: Blocks, moving: set[Entry], along: Directions) -> set[Entry]:
+    """The entries whose derivatives something reads: a result, another program, or the solution of a call."""
     lists = {list_name(place) for call, _ in every for place in call.reads}
     read: set[Entry] = set()
     for call, program in every:
         for name, entry in _written(call, program, blocks).items():
-            if entry[0] not in lists or name in call.differentiated:
+            if entry[0] not in lists or name in _solved(call, program, along):
                 read.add(entry)
     size = -1
     while size != len(read):

@@ -12,10 +12,8 @@ from msfp_gen.specification.layout import Effects
 from .derive import Equations
 from .directions import BY_ENDS, BY_PARAMETERS, BY_VARIABLES, Directions, directed
 from .lower import Kernel, by_inputs, lower
-from .program import Block, Program
-from .schedule import (
+from .places import (
     LISTS,
-    VARIABLES,
     Call,
     If,
     List,
@@ -27,20 +25,16 @@ from .schedule import (
     Solve,
     Values,
     When,
-    beside,
     calls_of,
     check,
-    condensed,
-    energies,
     index_of,
     list_name,
     list_of,
-    momentum_balances,
     output_is_stored,
     passes_of,
-    two_port,
-    unknowns,
 )
+from .program import Block, Program
+from .schedule import VARIABLES, beside, condensed, energies, memories, momentum_balances, remembers, two_port, unknowns
 from .two_port import eliminated, end_angles
 
 LOOPS = {
@@ -55,7 +49,6 @@ CONDITIONS = {  # C; w: the argument of the driver that is the work area
     When.RIM_CLOSED: "{w}->rim_gap[j] < 0.0",
     When.ON_FACE: "{w}->standing[j] == MSFP_ON_FACE",
     When.ON_EDGE: "{w}->standing[j] == MSFP_ON_EDGE",
-    When.OFF_CENTRE: "msfp_body_sp({w}->body[j + 1]) != 0.0 || {w}->body[j + 1][MSFP_BODY_ST] != 0.0",
 }
 RUNTIME: Mapping[tuple[str, str], tuple[str, tuple[str, ...]]] = {
     ("foot", "values"): ("msfp_move_foot", ("p", "s->foot_stage", "w")),
@@ -144,7 +137,8 @@ def end_kernels(equations: Equations) -> tuple[Kernel, ...]:
 def with_ends(effects: Effects) -> Schedule:
     """The condensed equations after the load of the interface, and the wrenches of the ends."""
     port = two_port(effects)
-    return {"interface": port["interface"], **condensed(effects), **port}
+    remembered = memories("by_ends") if remembers(effects) else {}
+    return {"interface": port["interface"], **condensed(effects), **port, **remembered}
 
 
 def _kernels(equations: Equations, schedule: Schedule, along: Directions) -> tuple[Kernel, ...]:

@@ -178,6 +178,40 @@ def works(b: Blocks, rims: bool, uplift: bool) -> Program:
     return p
 
 
+def tilt(b: Blocks) -> Program:
+    """Tilt of a body relative to the body below, in the plane; their sum is the tilt of the top plate."""
+    p = Program("tilt", "tilt of a body relative to the body below")
+    x: Symbols = p.read(b.coordinates, "x")
+    p.write(b.tilt, {"theta": x["theta"]})
+    return p
+
+
+def load_end(b: Blocks) -> Program:
+    """Load on the top plate, and its displacement and tilt, at one end of a quasi-static step."""
+    p = Program("load_end", "load on the top plate, with displacement and tilt, at one end of a step")
+    force: Symbols = p.read(b.force, "fe")
+    moment: Symbols = p.read(b.moment, "me")
+    body: Symbols = p.read(b.body, "b")
+    base: Symbols = p.read(b.base_motion, "base")
+    turned: Symbols = p.read(b.tilt, "t")
+    d = subtract(body["C"], base["O"])
+    p.write(b.load_end, {"F": force["F"], "M": moment["M"], "d": d, "tilt": turned["theta"]})
+    return p
+
+
+def load_work(b: Blocks) -> Program:
+    """Work of the load over a quasi-static step, from its displacement: by the trapezoidal rule, in the plane."""
+    p = Program("load_work", "work of the load over a step")
+    a: Symbols = p.read(b.load_end, "a")
+    e: Symbols = p.read(b.load_end, "e")
+    pairs = [(a["F"][i] + e["F"][i], e["d"][i] - a["d"][i]) for i in (0, 2)]
+    work = sp.Integer(0)
+    for load, way in (*pairs, (a["M"][1] + e["M"][1], e["tilt"] - a["tilt"])):
+        work = p.let(work + p.let(p.let(load) * p.let(way) / 2))
+    p.write(b.load_work, {"work": work})
+    return p
+
+
 def programs(b: Blocks, rims: bool, uplift: bool, rotating_support: bool) -> list[Program]:
     """All programs of the energy balance but the energies of masses."""
     return [

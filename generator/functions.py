@@ -82,6 +82,20 @@ class Modulus(sp.Function):  # type: ignore[misc]
         return 2 * Step(self.args[0]) - 1
 
 
+class Length(sp.Function):  # type: ignore[misc]
+    """sqrt(x^2 + y^2). At zero, where it has a kink, its derivative counts as zero."""
+
+    nargs = 2
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """X or y over the length, or 0."""
+        return self.args[argindex - 1] * Select(self, 1 / self, 0)
+
+
+class Hypot(Length):
+    """The same length, printed as `msfp_hypot`, which does not overflow and rounds differently."""
+
+
 # Functions of `runtime/msfp_math.h`, which give the same numbers on every system.
 FUNCTIONS = {name: f"msfp_{name}" for name in ("sin", "cos", "asin", "exp", "log", "tanh")}
 
@@ -134,6 +148,13 @@ class Printer(C99CodePrinter):  # type: ignore[misc]
     def _print_Modulus(self, expr: sp.Function) -> str:
         return f"fabs({self._print(expr.args[0])})"
 
+    def _print_Length(self, expr: sp.Function) -> str:
+        x, y = expr.args
+        return f"fabs({self._print(x)})" if y == 0 else str(self._print(sp.sqrt(x**2 + y**2)))
+
+    def _print_Hypot(self, expr: sp.Function) -> str:
+        return f"msfp_hypot({', '.join(map(self._print, expr.args))})"
+
 
 _PRINTER = Printer()
 
@@ -173,4 +194,5 @@ def in_numpy() -> dict[str, Any]:
         "Clamp": lambda x: np.clip(x, -1.0, 1.0),
         "ArcTan2": np.arctan2,
         "Modulus": np.abs,
+        **dict.fromkeys(("Length", "Hypot"), np.hypot),
     }

@@ -94,6 +94,8 @@ SYMBOLS: dict[str, dict[str, str]] = {
     "slip_end": {"Y": r"Y^{1}_{@}", "N": r"\bar{N}_{@}"},
     "friction_end": {"Y": r"Y_{@}", "g": r"g_{1@}"},
     "slip_work": {"stored": r"W_{f@}", "lost": r"W_{d@}"},
+    "load_end": {"F": r"F_{E,#}^{@}", "M": r"M_{E,#}^{@}", "d": r"u_{#}^{@}", "tilt": r"\vartheta^{@}"},
+    "load_work": {"work": "W_{E}"},
     "unknowns": {"psi": r"\tilde{\psi}_{@}", "theta": r"\tilde{\theta}_{@}", "N": r"N_{@}"},
     "contact": {
         "M": r"M_{@,#}",
@@ -203,6 +205,7 @@ PLACES: dict[str, dict[str, str]] = {
     "upper_wrench": {"e": "B", "b": "n", "f": "n", "m": "n", "out": "B"},
     "friction_after_slip": {"par": r"\gamma", "s": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
     "slip_work": {"par": r"\gamma", "s": r"\gamma", "e": r"\gamma", "out": r"\gamma"},
+    "load_work": {"a": "0", "e": "1", "out": ""},
     "linear_balance": {"par": "k", "b": "k", "lo": "k-1", "up": "k", "out": "k"},
     "angular_balance": {"par": "k", "b": "k", "lo": "k-1", "ml": "k-1", "up": "k", "mu": "k", "out": "k"},
 }
@@ -243,6 +246,9 @@ class Latex(LatexPrinter):  # type: ignore[misc]
     def _print_Stumpff(self, expr: sp.Function, exp: Any = None) -> str:
         text = rf"c_{{{expr.args[0]}}}\left({self._print(expr.args[1])}\right)"
         return text if exp is None else rf"{text}^{{{exp}}}"
+
+    def _print_Length(self, expr: sp.Function, exp: Any = None) -> str:
+        return str(self._print(sp.sqrt(expr.args[0] ** 2 + expr.args[1] ** 2)))
 
     def _print_Modulus(self, expr: sp.Function, exp: Any = None) -> str:
         return self._function("abs", expr, exp)

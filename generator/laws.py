@@ -212,13 +212,83 @@ def _add_memory_fields(b: Blocks, memory: Memory) -> Blocks:
         b = replace(
             b, contact_frame=with_fields(b.contact_frame, [TILT_FIELD]), relative=with_fields(b.relative, [TILT_FIELD])
         )
+    part = Field("m", memory.unit, f"a part of the {memory.meaning}")
+    own = {
+        "memory_part": [Field("rate", "1/s", "of a part"), Field("weight", "-", "of the source in a part")],
+        "memory": [part],
+        "memory_end": [part, Field("d", f"{memory.unit}/s", "its rate")],
+        "memory_past": fields[:1],
+        "memory_gain": fields[1:],
+        "diagonal": [Field("beta", "s", "diagonal entry of the stage formula; 0 outside of a step", fixed=True)],
+    }
     return replace(
         b,
+        **{name: with_fields(Block(name, (), {}), of) for name, of in own.items()},
         friction_previous=with_fields(b.friction_previous, fields),
         friction_stage=with_fields(b.friction_stage, fields),
         contact=with_fields(b.contact, results),
         report_contact=with_fields(b.report_contact, [source]),
     )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A part of a memory in its stage formula: rate, weight, diagonal entry beta, and 1 + beta rate."""
+
+    rate: sp.Expr
+    weight: sp.Expr
+    beta: sp.Expr
+    divisor: sp.Expr
+
+
+def _part(p: Program, b: Blocks, memory: Memory) -> _Part:
+    """Inputs of the programs of a part."""
+    assert b.memory_part is not None and b.diagonal is not None
+    part: Symbols = p.read(b.memory_part, "k")
+    par: Symbols = p.read(b.surface_parameters, "par")
+    beta = p.read(b.diagonal, "h")["beta"]
+    rate = p.let(par[memory.pace] * part["rate"]) if memory.pace else part["rate"]
+    return _Part(rate, part["weight"], beta, p.let(1 + p.let(beta * rate)))
+
+
+def memory_past(b: Blocks, memory: Memory) -> Program:
+    """What the earlier stages contribute to a memory by one of its parts, by the formula of `memory_stage`."""
+    p = Program("memory_past", f"{memory.meaning}: what the earlier stages contribute by a part")
+    part = _part(p, b, memory)
+    assert b.memory is not None and b.memory_past is not None
+    before: Symbols = p.read(b.memory, "m")
+    p.write(b.memory_past, {"past": before["m"] / part.divisor})
+    return p
+
+
+def memory_gain(b: Blocks, memory: Memory) -> Program:
+    """What the source of a stage contributes to a memory by one of its parts, per unit."""
+    p = Program("memory_gain", f"{memory.meaning}: what the source of a stage contributes by a part, per unit")
+    part = _part(p, b, memory)
+    assert b.memory_gain is not None
+    p.write(b.memory_gain, {"gain": p.let(part.beta * part.weight) / part.divisor})
+    return p
+
+
+def memory_stage(b: Blocks, memory: Memory) -> Program:
+    """A part of a memory at the end of a stage, and its rate, d(part)/dt = weight source - rate part.
+
+    The stage formula, part = before + beta d(part)/dt, is linear in the part and is solved for it (docs/friction.md).
+    """
+    p = Program("memory_stage", f"{memory.meaning}: a part at the end of a stage, and its rate")
+    part = _part(p, b, memory)
+    assert b.memory is not None and b.memory_end is not None
+    before: Symbols = p.read(b.memory, "m")
+    contact: Symbols = p.read(b.contact, "c")
+    supplied = p.let(p.let(part.beta * part.weight) * contact["source"])
+    m = p.let(p.let(before["m"] + supplied) / part.divisor)
+    p.write(b.memory_end, {"m": m, "d": p.let(part.weight * contact["source"]) - p.let(part.rate * m)})
+    return p
+
+
+def memory_programs(b: Blocks, memory: Memory) -> list[Program]:
+    """The programs of what a surface remembers."""
+    return [memory_past(b, memory), memory_gain(b, memory), memory_stage(b, memory)]
 
 
 def read_unknown_coefficient(p: Program, b: Blocks, law: Law | None, par: Symbols) -> Symbols:

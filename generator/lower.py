@@ -227,6 +227,7 @@ def directional(
         inputs=inputs,
         statements=[Statement(s.target.xreplace(names), s.expression.xreplace(names)) for s in program.statements],
         results={field: result.xreplace(names) for field, result in program.results.items()},
+        unknowns={unknown: equal.xreplace(names) for unknown, equal in program.unknowns.items()},
         tangents=results,
         columns=columns,
         lanes="",

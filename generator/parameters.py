@@ -167,6 +167,19 @@ def top_block(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> Program
     return p
 
 
+def seat_compliance(b: Blocks, scene_values: ValueBlocks) -> Program:
+    """Compliance of a unilateral contact; the contacts of a stack act in series (docs/uplift.md)."""
+    p = Program("seat_compliance", "compliance of a unilateral contact")
+    v: Symbols = p.read(scene_values.surface_values, "v")
+    p.write(b.compliance, {"compliance": 1 / v["seat_stiffness"]})
+    return p
+
+
 def programs(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> list[Program]:
     """The programs that make the parameters of a stack from the values of a scene."""
-    return [body_block(b, scene_values), surface_block(b, scene_values, effects), top_block(b, scene_values, effects)]
+    return [
+        body_block(b, scene_values),
+        surface_block(b, scene_values, effects),
+        *([seat_compliance(b, scene_values)] if effects.uplift else []),
+        top_block(b, scene_values, effects),
+    ]

@@ -172,6 +172,8 @@ class Program:
     lanes: str = ""
     """C constant with the number of surfaces or unknowns for which C evaluates it at once (SIMD), with the Jacobian
     with respect to its active inputs; empty for a program that is evaluated once."""
+    unknowns: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    """Input for which the runtime solves -> what it equals, by the results: the stage formula, or a law."""
     stored: bool = True
     """Whether the results are stored. Where only their tangents are, a statement whose target is an input is read."""
     rates: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)

@@ -18,8 +18,9 @@ from .expressions import Definitions, Expressions, Tape, folded
 from .functions import Select
 from .latex import SYMBOLS, field_names
 from .lower import needed_statements
+from .places import LISTS, Place, Solve, passes_of, unrolled
 from .program import Block, Program, Statement
-from .schedule import LISTS, Place, Solve, momentum_balances, passes_of, unrolled
+from .schedule import momentum_balances
 
 Record = Mapping[str, sp.Expr]
 """Stored field of a block -> its value."""

@@ -24,7 +24,7 @@ from .lower import (
     values_of_tangents,
     with_all_inputs,
 )
-from .program import ZERO, Program, Statement, Symbols, add, cross, dot, scale, subtract
+from .program import ZERO, Program, Statement, Symbols, add, cross, derivative, dot, scale, subtract
 
 
 def _angles(p: Program, t: Symbols) -> dict[str, sp.Expr]:
@@ -124,25 +124,12 @@ def end_angles(every: Iterable[Program], b: Blocks, along: Directions) -> Iterat
             yield lower(replace(found, name=f"support_angles_{along.suffix}", tangents=support))
 
 
-def _local_equations(program: Program) -> Iterator[tuple[sp.Symbol, str, sp.Expr, sp.Symbol | None]]:
-    """The local unknowns of a contact, each with the equation unknown = known + factor result (contact.c)."""
-    for use in program.inputs:
-        for field in use.block.fields if use.alias in ("g", "c") else ():
-            unknown = sp.Symbol(f"{use.alias}_{field.name}", real=True)
-            if use.alias == "c":
-                yield unknown, field.name, sp.Integer(1), None
-            else:
-                tau, known = (sp.Symbol(f"h_{name}", real=True) for name in ("tau", field.name))
-                yield unknown, f"d{field.name}", tau, known
-
-
-def _by_unknowns(
-    kernel: Kernel, equations: list[tuple[sp.Symbol, str, sp.Expr, sp.Symbol | None]]
-) -> tuple[list[Statement], list[dict[str, sp.Expr]], sp.Matrix]:
+def _by_unknowns(kernel: Kernel) -> tuple[list[Statement], list[dict[str, sp.Expr]], sp.Matrix]:
     """Statements, derivatives of the results by each unknown, and the inverse of the matrix of the equations."""
     statements: list[Statement] = []
     columns: list[dict[str, sp.Expr]] = []
-    for unknown, *_ in equations:
+    program = kernel.program
+    for unknown in program.unknowns:
         more, results = jacobian_column(kernel, unknown)
         statements += more
         columns.append(results)
@@ -151,10 +138,11 @@ def _by_unknowns(
         statements.append(Statement(sp.Symbol(text, real=True), expression))
         return statements[-1].target
 
-    count = len(equations)
-    matrix = sp.Matrix(
-        count, count, lambda k, i: name(f"m_{k}{i}", int(k == i) - equations[k][2] * columns[i][equations[k][1]])
-    )
+    def slope(equal: sp.Expr, column: dict[str, sp.Expr]) -> sp.Expr:
+        return sp.Add(*(derivative(equal, program.results[name]) * by for name, by in column.items()))
+
+    equal, count = list(program.unknowns.values()), len(program.unknowns)
+    matrix = sp.Matrix(count, count, lambda k, i: name(f"m_{k}{i}", int(k == i) - slope(equal[k], columns[i])))
     determinant = name("determinant", matrix.det(method="berkowitz"))
     adjugate = matrix.adjugate()
     return statements, columns, sp.Matrix(count, count, lambda k, i: name(f"n_{k}{i}", adjugate[k, i] / determinant))
@@ -162,10 +150,9 @@ def _by_unknowns(
 
 def eliminated(program: Program) -> Kernel:
     """The derivatives of `contact`, whose local unknowns follow by the implicit function theorem."""
-    kernel, equations = lower(program), list(_local_equations(program))
-    statements, columns, inverse = _by_unknowns(kernel, equations)
-    unknowns = {unknown for unknown, *_ in equations}
-    moving = active_inputs(program) - unknowns
+    kernel, unknowns = lower(program), list(program.unknowns)
+    statements, columns, inverse = _by_unknowns(kernel)
+    moving = active_inputs(program) - set(unknowns)
     tangents: list[Tangent] = []
 
     def add(target: sp.Symbol, terms: Iterable[tuple[sp.Expr, sp.Symbol]]) -> None:
@@ -176,17 +163,17 @@ def eliminated(program: Program) -> Kernel:
 
     for tangent in kernel.tangents:  # at constant unknowns
         add(tangent.target, tangent.terms)
-    rests = [sp.Symbol(f"rest_{k}", real=True) for k in range(len(equations))]
-    for rest, (_, result, factor, known) in zip(rests, equations, strict=True):
-        add(rest, [(factor, program.results[result]), *([(sp.Integer(1), known)] if known is not None else [])])
-    for k, (unknown, *_) in enumerate(equations):
+    rests = [sp.Symbol(f"rest_{k}", real=True) for k in range(len(unknowns))]
+    for rest, equal in zip(rests, program.unknowns.values(), strict=True):
+        add(rest, ((derivative(equal, s), s) for s in sorted(equal.free_symbols, key=str)))
+    for k, unknown in enumerate(unknowns):
         moving.discard(unknown)
         add(unknown, [(inverse[k, i], rest) for i, rest in enumerate(rests)])
     results = dict(program.results)
     for name in (name for name in program.results if name in program.tangents):
         value, total = results[name], sp.Symbol(f"total_{name}", real=True)
         sign = 1 if value.is_Symbol else -1
-        by_unknowns = [(column[name], unknown) for column, (unknown, *_) in zip(columns, equations, strict=True)]
+        by_unknowns = [(column[name], unknown) for column, unknown in zip(columns, unknowns, strict=True)]
         add(total, [(sp.Integer(sign), sign * value), *by_unknowns])
         results[name] = total
     inputs = [

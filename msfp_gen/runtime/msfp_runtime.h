@@ -351,8 +351,7 @@ typedef struct {
     double power[MSFP_WORKS];/* before it [W] */
     double jerk[MSFP_NB];    /* third divided difference of theta [rad/s^3] */
     double span;             /* length of the last two steps [s]; 0: there were not two */
-    /* At its end: force of the load and its moment about E2; r_nn from the base [m] and tilt of the top [rad]; N. */
-    double load[4], way[4], normal[MSFP_NB];
+    double load_end[MSFP_LOAD_END_SIZE], normal[MSFP_NB]; /* at its end: load and displacement of the top; N */
 } msfp_step_history;
 #endif
 

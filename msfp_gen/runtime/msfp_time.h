@@ -3,6 +3,7 @@
 #ifndef MSFP_TIME_H
 #define MSFP_TIME_H
 #include <math.h>
+#include <stddef.h>
 
 #define MSFP_CLOSE 1e-9             /* [s], far below any period of a bearing; closer times count as equal */
 #define MSFP_SHORTEST_TO_EVENT 1e-6 /* [s]; a shorter step to an event would be lost in roundoff */
@@ -16,6 +17,24 @@ MSFP_INLINE void msfp_add(double *restrict sum, const double *restrict rates, do
 {
     for (int i = 0; i < count; ++i)
         sum[i] += weight * rates[i];
+}
+
+/* sum += h times the weighted rates of the first `count` stages, of `numbers` each; size: numbers from one stage to the
+ * next. */
+MSFP_INLINE void msfp_sum_stages(double *sum, const double *rates, size_t size, const double *weights, int count, double h,
+                                 int numbers)
+{
+    for (int j = 0; j < count; ++j)
+        msfp_add(sum, rates + j * size, h * weights[j], numbers);
+}
+
+/* First guess of a rate at stage i, from an acceleration that goes on linearly, as one of the base that is linear in time
+ * causes. c: shares of the stages; V: what the earlier stages give; first, last: accelerations at the start and at the
+ * stage before; slope: change of the acceleration per step before. */
+MSFP_INLINE double msfp_guess_rate(const double *c, int i, double V, double beta, double first, double last, double slope)
+{
+    const double change = i > 1 ? (last - first) / c[i - 1] : slope;
+    return V + beta * (first + c[i] * change);
 }
 
 /* The stage formula: q = q0 + beta v, a = rate (v - v0) with rate = 1/beta, or 0 without inertia. Of `count` numbers. */

@@ -293,15 +293,12 @@ static void begin_stage(msfp_building *b, int i, double h, double beta)
     const msfp_method_stages *m = &b->method;
     memcpy(b->Q, b->u, (size_t)n * sizeof *b->Q);
     memcpy(b->V, b->v, (size_t)n * sizeof *b->V);
-    for (int j = 0; j < i; ++j) {
-        msfp_add(b->Q, b->stage_v + (size_t)j * n, h * m->weights[i][j], n);
-        msfp_add(b->V, b->stage_a + (size_t)j * n, h * m->weights[i][j], n);
-    }
+    msfp_sum_stages(b->Q, b->stage_v, n, m->weights[i], i, h, n);
+    msfp_sum_stages(b->V, b->stage_a, n, m->weights[i], i, h, n);
     drive(b, b->Q, b->V, beta);
     for (int c = 0; c < b->scene.attachments; ++c) {
         const double *a = b->stage_a + c;
-        const double slope = i > 1 ? (a[(size_t)(i - 1) * n] - a[0]) / m->shares[i - 1] : h * b->slope[c];
-        b->x[c] = b->V[c] + beta * (a[0] + m->shares[i] * slope);
+        b->x[c] = msfp_guess_rate(m->shares, i, b->V[c], beta, a[0], a[(size_t)(i - 1) * n], h * b->slope[c]);
     }
 }
 

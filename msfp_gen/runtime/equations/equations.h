@@ -8,13 +8,6 @@
 #include <math.h>
 #include "msfp_model.h"
 
-#if MSFP_PACED
-#define MSFP_IF_PACED(...) , __VA_ARGS__ /* one more argument where the memories of surfaces have a pace */
-#define MSFP_RATE(pace, lambda) ((pace) * (lambda))
-#else
-#define MSFP_IF_PACED(...)
-#define MSFP_RATE(pace, lambda) (lambda)
-#endif
 #if MSFP_LAW
 #define MSFP_IF_LAW(...) , __VA_ARGS__ /* one more argument where the friction coefficient is an unknown */
 #else
@@ -170,9 +163,19 @@ void msfp_set_observed(const msfp_point *at, msfp_blocks *s);
 void msfp_gap_of_rim(const msfp_work *w, int j, double *rim);
 /* Power that plastic slip and the drilling moment dissipate at surface j [W]. */
 double msfp_heating(const msfp_parameters *p, const msfp_work *w, int j);
+#if MSFP_CLOSED_FORM
+/* Load on the top plate with its displacement at the evaluation in `w`, as the block `load_end`; its work between two
+ * such ends [J]. */
+void msfp_end_of_load(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *end);
+double msfp_work_of_load(const double *from, const double *to);
+#endif
 /* Kinetic and potential energy and that of all springs but friction [J]. */
 double msfp_stored_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,
                           const msfp_mechanical *mechanical);
+/* Length of two numbers of a row. */
+double msfp_length_of(const double pair[2]);
+/* Y, Z scaled to the size of others. */
+void msfp_bound_friction(double f[2], const double most[2]);
 /* Evaluate the equations at a state outside of a step; fills weights and g, the friction force over -mu N. */
 void msfp_evaluate_state(const msfp_parameters *p, const msfp_point *at, msfp_stage_weights *weights, msfp_work *w,
                          double g[MSFP_NB][2]);
@@ -189,15 +192,9 @@ void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
 #if MSFP_MEMORY
 /* Memories of a stage with diagonal entry beta [s], for its evaluation, from what the earlier stages give; at beta = 0
  * those of a state. */
-void msfp_memory_point(const msfp_state *from, double beta, msfp_point *at MSFP_IF_PACED(const msfp_parameters *p));
+void msfp_memory_point(const msfp_parameters *p, const msfp_state *from, double beta, msfp_point *at);
 /* Parts of the memories after the evaluation in `w`, and their rates, into `s`. */
-void msfp_memory_state(const msfp_work *w, const msfp_state *from, double beta,
-                       msfp_state *s MSFP_IF_PACED(const msfp_parameters *p));
-/* Of one surface, or of its columns, of which each number has `width`: the sum of the parts without the source; the parts
- * and their rates by the source. */
-void msfp_memory_past(const double *parts, double beta, int width, double *past MSFP_IF_PACED(double pace));
-void msfp_memory_stage(const double *from, const double *source, double beta, int width, double *parts,
-                       double *rates MSFP_IF_PACED(double pace));
+void msfp_memory_state(const msfp_parameters *p, const msfp_work *w, const msfp_state *from, double beta, msfp_state *s);
 /* Largest error of a memory over its tolerance [-]; error: its estimate, s: the end of the step. */
 double msfp_memory_error(const msfp_run *run, const msfp_state *error, const msfp_state *s, double beta);
 #else

@@ -37,7 +37,9 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
         p->rim_cosine[j] = msfp_cos(tilt);
         p->rim_slope[j] = radius / msfp_sin(tilt);
 #if MSFP_UPLIFT
-        p->around[MSFP_AROUND_COMPLIANCE] += 1.0 / values[MSFP_SURFACE_VALUES_SEAT_STIFFNESS];
+        double compliance;
+        msfp_seat_compliance(values, &compliance);
+        p->around[MSFP_AROUND_COMPLIANCE] += compliance;
 #endif
     }
     for (int i = 0; i < MSFP_SURFACE_PARAMETERS_SIZE; ++i)

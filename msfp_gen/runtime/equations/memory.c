@@ -1,65 +1,58 @@
 /* memory.c: what a sliding surface remembers, such as its temperature, by exponential states (docs/friction.md).
  *
- * It is a sum of parts above its start, each with dmemory/dt = -lambda memory + weight source. The stage formula of the
- * method is linear in them and is solved for them: memory = (from + beta weight source)/(1 + beta lambda). The sum of the
- * parts is past + gain * source. Where surfaces have a pace, it multiplies lambda.
+ * It is a sum of parts above its start. The programs memory_past, memory_gain and memory_stage of generator/laws.py are
+ * the stage formula of one part: the sum of all parts is past + gain * source.
  */
 #include <math.h>
 #include "equations.h"
 
 #if MSFP_MEMORY
+#include "msfp_kernels.h"
 
-static const double lambda[MSFP_MEMORY] = MSFP_MEMORY_RATES, weight[MSFP_MEMORY] = MSFP_MEMORY_WEIGHTS;
+static const double part[MSFP_MEMORY][MSFP_MEMORY_PART_SIZE] = MSFP_MEMORY_PARTS;
 
-void msfp_memory_past(const double *parts, double beta, int width, double *past MSFP_IF_PACED(double pace))
+void msfp_memory_point(const msfp_parameters *p, const msfp_state *from, double beta, msfp_point *at)
 {
-    for (int c = 0; c < width; ++c)
-        past[c] = 0.0;
-    for (int i = 0; i < MSFP_MEMORY; ++i)
-        for (int c = 0; c < width; ++c)
-            past[c] += parts[i * width + c] / (1.0 + beta * MSFP_RATE(pace, lambda[i]));
+    double one;
+    for (int j = 0; j < MSFP_GAINS; ++j) {
+        at->gain[j] = 0.0;
+        for (int i = 0; i < MSFP_MEMORY; ++i) {
+            msfp_memory_gain(part[i], p->surface[j], &beta, &one);
+            at->gain[j] += one;
+        }
+    }
+    for (int j = 0; j < NB; ++j) {
+        at->past[j] = 0.0;
+        for (int i = 0; i < MSFP_MEMORY; ++i) {
+            msfp_memory_past(part[i], p->surface[j], &beta, &from->memory[j][i], &one);
+            at->past[j] += one;
+        }
+    }
 }
 
-void msfp_memory_stage(const double *from, const double *source, double beta, int width, double *parts,
-                       double *rates MSFP_IF_PACED(double pace))
+void msfp_memory_state(const msfp_parameters *p, const msfp_work *w, const msfp_state *from, double beta, msfp_state *s)
 {
-    for (int i = 0; i < MSFP_MEMORY; ++i)
-        for (int c = 0; c < width; ++c) {
-            const int at = i * width + c;
-            parts[at] = (from[at] + beta * weight[i] * source[c]) / (1.0 + beta * MSFP_RATE(pace, lambda[i]));
-            rates[at] = weight[i] * source[c] - MSFP_RATE(pace, lambda[i]) * parts[at];
+    for (int j = 0; j < NB; ++j)
+        for (int i = 0; i < MSFP_MEMORY; ++i) {
+            double end[MSFP_MEMORY_END_SIZE];
+            msfp_memory_stage(part[i], p->surface[j], &beta, &from->memory[j][i], w->contact[j], end);
+            s->memory[j][i] = end[MSFP_MEMORY_END_M];
+            s->dmemory[j][i] = end[MSFP_MEMORY_END_D];
         }
 }
 
-void msfp_memory_point(const msfp_state *from, double beta, msfp_point *at MSFP_IF_PACED(const msfp_parameters *p))
-{
-    for (int j = 0; j < MSFP_GAINS; ++j) {
-        at->gain[j] = 0.0;
-        for (int i = 0; i < MSFP_MEMORY; ++i)
-            at->gain[j] += beta * weight[i] / (1.0 + beta * MSFP_RATE(p->surface[j][MSFP_PACE], lambda[i]));
-    }
-    for (int j = 0; j < NB; ++j)
-        msfp_memory_past(from->memory[j], beta, 1, &at->past[j] MSFP_IF_PACED(p->surface[j][MSFP_PACE]));
-}
-
-void msfp_memory_state(const msfp_work *w, const msfp_state *from, double beta,
-                       msfp_state *s MSFP_IF_PACED(const msfp_parameters *p))
-{
-    for (int j = 0; j < NB; ++j)
-        msfp_memory_stage(from->memory[j], &w->contact[j][MSFP_CONTACT_SOURCE], beta, 1, s->memory[j],
-                          s->dmemory[j] MSFP_IF_PACED(p->surface[j][MSFP_PACE]));
-}
-
 /* At rtol = 1e-3 the tolerance is a hundredth of the scale (of a temperature a tenth of a degree) and a hundredth of the
- * memory. The error of a fast part is filtered by (1 + beta lambda)^-1, as in implicit.c. */
+ * memory. The error of a fast part is filtered as in implicit.c, by what a stage leaves of it. */
 double msfp_memory_error(const msfp_run *run, const msfp_state *error, const msfp_state *s, double beta)
 {
     double worst = 0.0;
     for (int j = 0; j < NB; ++j) {
         double sum = 0.0, whole = 0.0;
         for (int i = 0; i < MSFP_MEMORY; ++i) {
-            sum += fabs(error->memory[j][i]) /
-                   (1.0 + beta * MSFP_RATE(run->parameters.surface[j][MSFP_PACE], lambda[i]));
+            const double size = fabs(error->memory[j][i]);
+            double left;
+            msfp_memory_past(part[i], run->parameters.surface[j], &beta, &size, &left);
+            sum += left;
             whole += s->memory[j][i];
         }
         worst = fmax(worst, sum / (run->options.rtol * (10.0 * MSFP_MEMORY_SCALE + 10.0 * fabs(whole))));

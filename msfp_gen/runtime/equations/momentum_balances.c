@@ -18,8 +18,7 @@ enum {
 static void give_friction_rates(const msfp_blocks *s, msfp_work *w)
 {
     for (int j = 0; j < NB; ++j) {
-        memcpy(w->contact[j] + MSFP_CONTACT_DY, s->report_contact[j] + MSFP_REPORT_CONTACT_DY,
-               FRICTION * sizeof(double));
+        memcpy(w->contact[j] + MSFP_CONTACT_DY, s->report_rates[j], sizeof s->report_rates[j]);
 #if MSFP_MEMORY
         w->contact[j][MSFP_CONTACT_SOURCE] = s->report_contact[j][MSFP_REPORT_CONTACT_SOURCE];
 #endif
@@ -65,8 +64,7 @@ void msfp_momentum_balances(const msfp_parameters *p, const msfp_point *at, cons
         put_columns(ds.excess[0], NB * FORCE, first, count, jacobian + (size_t)NB * ROWS * count);
 #endif
         for (int j = 0; j < NB && rates; ++j)
-            put_columns(ds.report_contact[j] + MSFP_REPORT_CONTACT_DY * DOF, FRICTION, first, count,
-                        rates + (size_t)2 * j * count);
+            put_columns(ds.report_rates[j], FRICTION, first, count, rates + (size_t)2 * j * count);
     }
 }
 

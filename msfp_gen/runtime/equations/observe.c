@@ -61,6 +61,23 @@ double msfp_heating(const msfp_parameters *p, const msfp_work *w, int j)
     return friction[MSFP_FRICTION_POWER_LOST];
 }
 
+#if MSFP_CLOSED_FORM
+void msfp_end_of_load(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *end)
+{
+    msfp_blocks s;
+    msfp_set_observed(at, &s);
+    msfp_loaded_values(p, w, &s);
+    memcpy(end, s.load_end, sizeof s.load_end);
+}
+
+double msfp_work_of_load(const double *from, const double *to)
+{
+    double work;
+    msfp_load_work(from, to, &work);
+    return work;
+}
+#endif
+
 double msfp_stored_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,
                           const msfp_mechanical *mechanical)
 {
@@ -75,6 +92,20 @@ double msfp_stored_energy(const msfp_parameters *p, const msfp_point *at, const 
     stored += s.unilateral_energy[MSFP_UNILATERAL_ENERGY_STORED];
 #endif
     return stored;
+}
+
+double msfp_length_of(const double pair[2])
+{
+    double size;
+    msfp_extreme_length(pair, &size);
+    return size;
+}
+
+void msfp_bound_friction(double f[2], const double most[2])
+{
+    double bounded[MSFP_FRICTION_SIZE];
+    msfp_bounded_friction(f, most, bounded);
+    memcpy(f, bounded, sizeof bounded);
 }
 
 void msfp_evaluate_state(const msfp_parameters *p, const msfp_point *at, msfp_stage_weights *weights, msfp_work *w,

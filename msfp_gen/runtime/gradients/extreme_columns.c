@@ -4,6 +4,8 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
+#include "msfp_gradient_kernels.h"
+
 /* Column c of the displacement across the bearing. */
 MSFP_INLINE double across_columns(const msfp_parameter_batch *batch, const msfp_row_columns d, int axis, int c)
 {
@@ -14,16 +16,19 @@ MSFP_INLINE double across_columns(const msfp_parameter_batch *batch, const msfp_
 static void take(const msfp_run *run, msfp_parameter_batch *batch, const msfp_row *row, const msfp_row_columns d,
                  int index)
 {
-    double across[3], slopes[2], *to = batch->extremes[index];
+    double across[3], pair[MSFP_PAIR_SIZE], dpair[MSFP_PAIR_SIZE * C] = { 0.0 }, *to = batch->extremes[index];
     int of;
     msfp_displacement_across(run, row, across);
-    const int count = msfp_extreme_slopes(index, row, across, &of, slopes);
-    memset(to, 0, sizeof(msfp_columns));
-    for (int i = of; i < of + count; ++i)
+    const int count = msfp_extreme_pair(index, row, across, &of, pair);
+    for (int i = 0; i < (count ? count : 1); ++i)
         for (int c = 0; c < C; ++c) {
-            const int axis = i - MSFP_ACROSS;
-            to[c] += slopes[i - of] * (axis < 0 ? d[i][c] : across_columns(batch, d, axis, c));
+            const int axis = of + i - MSFP_ACROSS;
+            dpair[i * C + c] = axis < 0 ? d[of + i][c] : across_columns(batch, d, axis, c);
         }
+    if (count)
+        msfp_extreme_length_direction(pair, dpair, to);
+    else
+        memcpy(to, dpair, sizeof(msfp_columns));
 }
 
 /* The row at a share of the step and its columns. */

@@ -54,10 +54,9 @@ static void parameters(const msfp_parameters *p, const value_columns *d, msfp_pa
         msfp_surface_block_direction(values, p->body_values[slider], sign, d->surface[j], d->body[slider], dsign,
                                      to->surface[j]);
 #if MSFP_UPLIFT
-        const double stiffness = values[MSFP_SURFACE_VALUES_SEAT_STIFFNESS];
-        for (int c = 0; c < C; ++c)
-            around[MSFP_AROUND_COMPLIANCE * C + c] -=
-                d->surface[j][MSFP_SURFACE_VALUES_SEAT_STIFFNESS * C + c] / (stiffness * stiffness);
+        double compliance[C];
+        msfp_seat_compliance_direction(values, d->surface[j], compliance);
+        msfp_add(around + MSFP_AROUND_COMPLIANCE * C, compliance, 1.0, C);
 #endif
     }
     msfp_top_block_direction(p->top_values, p->around, d->top, around, to->top);

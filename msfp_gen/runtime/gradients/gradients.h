@@ -133,7 +133,8 @@ MSFP_STATIC_ASSERT(sizeof(msfp_state_columns) == MSFP_COLUMNS * offsetof(msfp_st
 #if MSFP_CLOSED_FORM
 /* Of what the work of a quasi-static step follows from (msfp_step_history): powers before it, and at its end. */
 typedef struct {
-    msfp_columns power[MSFP_WORKS], load[4], way[4], normal[MSFP_NB];
+    msfp_columns power[MSFP_WORKS], normal[MSFP_NB];
+    double load_end[MSFP_LOAD_END_SIZE * MSFP_COLUMNS];
 } msfp_history_columns;
 #endif
 
@@ -275,13 +276,13 @@ void msfp_complete_columns(msfp_run *run, msfp_parameter_batch *batch);
 
 /* ---- memory_columns.c: memories of the surfaces, as the functions of memory.c without "columns" ---- */
 #if MSFP_MEMORY
-/* Into `dat`, after its columns of beta. from: values and columns of what the earlier stages give. */
-void msfp_memory_point_columns(const msfp_state *from, const msfp_state_columns *dfrom, double beta,
-                             msfp_point_columns *dat MSFP_IF_PACED(const msfp_parameters *p, const msfp_parameter_columns *dp));
-/* source: its columns, of all surfaces; s: the values of the state. */
-void msfp_memory_state_columns(const msfp_state *s, const msfp_state_columns *dfrom, const msfp_columns source[MSFP_NB],
-                             double beta, const double *dbeta,
-                             msfp_state_columns *ds MSFP_IF_PACED(const msfp_parameters *p, const msfp_parameter_columns *dp));
+/* Into `dat`, after its columns of beta. from: what the earlier stages give. */
+void msfp_memory_point_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_state *from,
+                               const msfp_state_columns *dfrom, double beta, msfp_point_columns *dat);
+/* At the evaluation in `w`, whose columns are d. */
+void msfp_memory_state_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                               const msfp_work_columns *d, const msfp_state *from, const msfp_state_columns *dfrom,
+                               double beta, const double *dbeta, msfp_state_columns *ds);
 #else
 #undef msfp_memory_point_columns /* its prefixed name, see msfp_symbols.h */
 #define msfp_memory_point_columns(...) ((void)0)
@@ -293,6 +294,11 @@ void msfp_memory_state_columns(const msfp_state *s, const msfp_state_columns *df
 void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
                             msfp_state_columns *to);
+#if MSFP_CLOSED_FORM
+/* Columns of the block `load_end` at the same evaluation. */
+void msfp_load_end_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                           const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d, double *columns);
+#endif
 /* Columns of the powers of the present state, at the point and evaluation of msfp_initial_columns. */
 void msfp_initial_works(msfp_run *run, msfp_parameter_batch *batch, const msfp_point *at,
                         const msfp_stage_weights *weights, const double g[MSFP_NB][2]);

@@ -91,7 +91,7 @@ int msfp_initial_columns(msfp_run *run, msfp_parameter_batch *batch, int first)
     memcpy(dat->q, now->q, sizeof dat->q);
     memcpy(dat->v, now->v, sizeof dat->v);
     memcpy(dat->f, now->f, sizeof dat->f);
-    msfp_memory_point_columns(&run->now, now, 0.0, dat MSFP_IF_PACED(p, dp));
+    msfp_memory_point_columns(p, dp, &run->now, now, 0.0, dat);
     msfp_inputs_columns(run, batch, run->now.t, now->t, dat);
     if (first) {
         msfp_condensed_columns(p, dp, &at, dat, &weights, w, slopes, MSFP_OF_RESIDUAL, &batch->work);
@@ -110,11 +110,7 @@ int msfp_initial_columns(msfp_run *run, msfp_parameter_batch *batch, int first)
     msfp_friction_columns(&batch->work, now->df, NULL);
 #if MSFP_MEMORY
     static const msfp_columns fixed;
-    msfp_columns source[NB];
-    for (int j = 0; j < NB; ++j)
-        memcpy(source[j], batch->work.contact[j] + MSFP_CONTACT_SOURCE * C, sizeof source[j]);
-    msfp_memory_state_columns(&run->now, now, (const msfp_columns *)source, 0.0, fixed,
-                              now MSFP_IF_PACED(p, dp));
+    msfp_memory_state_columns(p, dp, w, &batch->work, &run->now, now, 0.0, fixed, now);
 #endif
     memcpy(now->foot, batch->work.foot + MSFP_FOOT_Y * C, sizeof now->foot);
     memcpy(now->dfoot, batch->work.foot + MSFP_FOOT_Y1 * C, sizeof now->dfoot);

@@ -1,4 +1,4 @@
-/* memory_columns.c: directional derivatives of the memories of the surfaces: the formulas of memory.c, differentiated. */
+/* memory_columns.c: directional derivatives of the memories of the surfaces, part by part as in memory.c. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("O3") /* vectorises loops over columns */
 #endif
@@ -7,53 +7,40 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS && MSFP_MEMORY
-static const double lambda[MSFP_MEMORY] = MSFP_MEMORY_RATES, weight[MSFP_MEMORY] = MSFP_MEMORY_WEIGHTS;
+#include "msfp_gradient_kernels.h"
 
-/* Those of the parts are linear in them (memory.c); beta adds its own where the length of the step has columns, and the
- * pace of a surface where a parameter moves it. */
-void msfp_memory_point_columns(const msfp_state *from, const msfp_state_columns *dfrom, double beta,
-                               msfp_point_columns *dat MSFP_IF_PACED(const msfp_parameters *p, const msfp_parameter_columns *dp))
+static const double part[MSFP_MEMORY][MSFP_MEMORY_PART_SIZE] = MSFP_MEMORY_PARTS, fixed[MSFP_MEMORY_PART_SIZE * C];
+
+void msfp_memory_point_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_state *from,
+                               const msfp_state_columns *dfrom, double beta, msfp_point_columns *dat)
 {
+    msfp_columns one[1];
     memset(dat->gain, 0, sizeof dat->gain);
+    memset(dat->past, 0, sizeof dat->past);
     for (int j = 0; j < NB; ++j)
-        msfp_memory_past(dfrom->memory[j][0], beta, C, dat->past[j] MSFP_IF_PACED(p->surface[j][MSFP_PACE]));
-    for (int n = 0; n < MSFP_MEMORY; ++n)
-        for (int j = 0; j < NB; ++j) {
-            const double share = 1.0 / (1.0 + beta * MSFP_RATE(p->surface[j][MSFP_PACE], lambda[n]));
-            for (int c = 0; c < C; ++c) {
-                double of_beta = dat->beta[c], moved = dat->beta[c];
-#if MSFP_PACED
-                const double of_pace = dp->surface[j][MSFP_PACE * C + c];
-                of_beta -= beta * beta * lambda[n] * of_pace;
-                moved = p->surface[j][MSFP_PACE] * moved + beta * of_pace;
-#endif
-                if (j < MSFP_GAINS)
-                    dat->gain[j][c] += weight[n] * share * share * of_beta;
-                dat->past[j][c] -= share * share * lambda[n] * from->memory[j][n] * moved;
-            }
+        for (int i = 0; i < MSFP_MEMORY; ++i) {
+            msfp_memory_past_direction(part[i], p->surface[j], &beta, &from->memory[j][i], fixed, dp->surface[j], dat->beta,
+                                       dfrom->memory[j][i], one[0]);
+            msfp_add_columns(&dat->past[j], (const msfp_columns *)one, 1.0, 1);
+        }
+    for (int j = 0; j < MSFP_GAINS; ++j)
+        for (int i = 0; i < MSFP_MEMORY; ++i) {
+            msfp_memory_gain_direction(part[i], p->surface[j], &beta, fixed, dp->surface[j], dat->beta, one[0]);
+            msfp_add_columns(&dat->gain[j], (const msfp_columns *)one, 1.0, 1);
         }
 }
 
-void msfp_memory_state_columns(const msfp_state *s, const msfp_state_columns *dfrom, const msfp_columns source[NB],
-                               double beta, const double *dbeta,
-                               msfp_state_columns *ds MSFP_IF_PACED(const msfp_parameters *p, const msfp_parameter_columns *dp))
+void msfp_memory_state_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                               const msfp_work_columns *d, const msfp_state *from, const msfp_state_columns *dfrom,
+                               double beta, const double *dbeta, msfp_state_columns *ds)
 {
-    for (int j = 0; j < NB; ++j) {
-        msfp_memory_stage(dfrom->memory[j][0], source[j], beta, C, ds->memory[j][0],
-                          ds->dmemory[j][0] MSFP_IF_PACED(p->surface[j][MSFP_PACE]));
-        for (int n = 0; n < MSFP_MEMORY; ++n) {
-            const double rate = MSFP_RATE(p->surface[j][MSFP_PACE], lambda[n]);
-            for (int c = 0; c < C; ++c) {
-                double moved = s->dmemory[j][n] / (1.0 + beta * rate) * dbeta[c];
-#if MSFP_PACED
-                const double of_pace = lambda[n] * s->memory[j][n] * dp->surface[j][MSFP_PACE * C + c];
-                moved -= beta / (1.0 + beta * rate) * of_pace;
-                ds->dmemory[j][n][c] -= of_pace;
-#endif
-                ds->memory[j][n][c] += moved;
-                ds->dmemory[j][n][c] -= rate * moved;
-            }
+    for (int j = 0; j < NB; ++j)
+        for (int i = 0; i < MSFP_MEMORY; ++i) {
+            double end[MSFP_MEMORY_END_SIZE * C];
+            msfp_memory_stage_direction(part[i], p->surface[j], &beta, &from->memory[j][i], w->contact[j], fixed,
+                                        dp->surface[j], dbeta, dfrom->memory[j][i], d->contact[j], end);
+            memcpy(ds->memory[j][i], end + MSFP_MEMORY_END_M * C, sizeof ds->memory[j][i]);
+            memcpy(ds->dmemory[j][i], end + MSFP_MEMORY_END_D * C, sizeof ds->dmemory[j][i]);
         }
-    }
 }
 #endif

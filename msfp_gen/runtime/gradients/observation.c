@@ -10,22 +10,12 @@
 #if MSFP_GRADIENTS
 #include "msfp_directions.h"
 
-/* The sliding displacement has a kink at the centre, where its columns are zero. */
-MSFP_INLINE void set_gap_columns(const double *dpar, const double *d, const double *sliding, msfp_columns *gap)
-{
-    const int centred = sliding[MSFP_GAP_S] == 0.0;
-    for (int c = 0; c < C; ++c) {
-        gap[MSFP_GAP_S][c] = centred ? 0.0 : d[MSFP_GAP_S * C + c];
-        gap[MSFP_GAP_G][c] = dpar[MSFP_SURFACE_PARAMETERS_SC * C + c] - gap[MSFP_GAP_S][c];
-    }
-}
-
 MSFP_WIDE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
                                  const double q[MSFP_NB][MSFP_NQ], msfp_columns dq[MSFP_NB][MSFP_NQ],
                                  double sliding[MSFP_NB][MSFP_GAP_SIZE],
                                  msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE])
 {
-    double x[MSFP_COORDINATES_SIZE] = { 0 }, dx[MSFP_COORDINATES_SIZE * C] = { 0 }, d[MSFP_GAP_SIZE * C];
+    double x[MSFP_COORDINATES_SIZE] = { 0 }, dx[MSFP_COORDINATES_SIZE * C] = { 0 };
     for (int j = 0; j < NB; ++j) {
 #if !MSFP_PLANAR
         x[MSFP_COORDINATES_PSI] = q[j][0];
@@ -34,8 +24,7 @@ MSFP_WIDE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_
         x[MSFP_COORDINATES_THETA] = q[j][1];
         memcpy(dx + MSFP_COORDINATES_THETA * C, dq[j][1], sizeof(msfp_columns));
         msfp_gap_at(p->surface[j], x, sliding[j]);
-        msfp_gap_at_direction(p->surface[j], x, sliding[j], dp->surface[j], dx, d);
-        set_gap_columns(dp->surface[j], d, sliding[j], gaps[j]);
+        msfp_gap_at_direction(p->surface[j], x, dp->surface[j], dx, gaps[j][0]);
     }
 }
 
@@ -136,13 +125,25 @@ MSFP_WIDE void msfp_columns_of_powers(const msfp_parameters *p, const msfp_param
     memcpy(to->power, ds.works, sizeof to->power + sizeof to->prescribed_power + sizeof to->load_power);
 }
 
+#if MSFP_CLOSED_FORM
+void msfp_load_end_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                           const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d, double *columns)
+{
+    msfp_blocks s;
+    msfp_block_directions ds;
+    set_observed(at, dat, &s, &ds);
+    msfp_loaded_directions(p, dp, w, (msfp_work_columns *)d, &s, &ds);
+    memcpy(columns, ds.load_end, sizeof ds.load_end);
+}
+#endif
+
 /* Quantities of surface j. */
 MSFP_INLINE void surface_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
                                  const msfp_work_columns *d, int j, msfp_columns *row)
 {
     const double *contact = w->contact[j], *dcontact = d->contact[j];
     msfp_columns gap[MSFP_GAP_SIZE], *angles = row + MSFP_ROW_ANGLES + 2 * j, *slip = row + MSFP_ROW_SLIP + 2 * j;
-    double sliding[MSFP_GAP_SIZE], dangles[MSFP_CONTACT_ANGLES_SIZE * C], dgap[MSFP_GAP_SIZE * C];
+    double dangles[MSFP_CONTACT_ANGLES_SIZE * C];
     memcpy(row[MSFP_ROW_NORMAL + j], dcontact + MSFP_CONTACT_N * C, sizeof *row);
     memset(angles[0], 0, sizeof *angles);
     memset(slip[1], 0, sizeof *slip);
@@ -164,9 +165,7 @@ MSFP_INLINE void surface_columns(const msfp_parameters *p, const msfp_parameter_
         row[MSFP_ROW_REMEMBERED + j][c] = dcontact[MSFP_CONTACT_MEMORY * C + c];
 #endif
     }
-    msfp_gap(p->surface[j], w->body[j + 1], sliding);
-    msfp_gap_direction(p->surface[j], w->body[j + 1], sliding, dp->surface[j], d->body[j + 1], dgap);
-    set_gap_columns(dp->surface[j], dgap, sliding, gap);
+    msfp_gap_direction(p->surface[j], w->body[j + 1], dp->surface[j], d->body[j + 1], gap[0]);
     memcpy(row[MSFP_ROW_SLIDING + j], gap[MSFP_GAP_S], sizeof *row);
     memcpy(row[MSFP_ROW_GAP + j], gap[MSFP_GAP_G], sizeof *row);
 #if MSFP_UPLIFT

@@ -7,6 +7,8 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
+#include "msfp_gradient_kernels.h"
+
 /* The evaluation of a state, with the derivatives of its contacts. */
 static void observe(msfp_run *run, const msfp_state *s, msfp_observation *o)
 {
@@ -29,7 +31,7 @@ static void observed_columns(msfp_run *run, msfp_parameter_batch *batch, const m
     memcpy(dat.a, ds->a, sizeof dat.a);
     memcpy(dat.f, ds->f, sizeof dat.f);
     memcpy(dat.foot, ds->foot, sizeof dat.foot);
-    msfp_memory_point_columns(s, ds, 0.0, &dat MSFP_IF_PACED(p, &batch->parameters));
+    msfp_memory_point_columns(p, &batch->parameters, s, ds, 0.0, &dat);
     msfp_condensed_columns(p, &batch->parameters, &o->at, &dat, &o->weights, &o->work, &o->slopes, MSFP_OF_ROW, dw);
     msfp_record_columns(p, &batch->parameters, &o->at, &dat, &o->work, dw, d);
     memcpy(d[MSFP_ROW_WORK], ds->work, sizeof ds->work);
@@ -99,24 +101,19 @@ static void weight_slopes(const msfp_run *run, double share, double *slopes)
     }
 }
 
-/* Columns of Y, Z where msfp_limit_row has scaled them to the size of those of another row. */
-static void limit_friction(const msfp_run *run, const msfp_row *row, const msfp_row_limits *limits, msfp_row_columns d)
+/* Columns of Y, Z where msfp_limit_row has scaled them to the size of others; f: before that. */
+static void limit_friction(const msfp_run *run, const double f[NB][2], const msfp_row_limits *limits, msfp_row_columns d)
 {
-    const msfp_row_columns *of_rows = run->gradients->recording.d;
+    static const double unit[2] = { 1.0, 0.0 };
+    static const msfp_columns constant[2];
     for (int j = 0; j < NB; ++j) {
-        const double most = limits->most[j], share = limits->share[j];
         const int of = limits->row[j];
-        for (int c = 0; c < C && share < 1.0; ++c) {
-            double outward = 0.0, further = 0.0;
-            for (int i = 0; i < 2; ++i) {
-                outward += row->f[j][i] / most * d[MSFP_ROW_F + 2 * j + i][c];
-                further += of < 0 ? 0.0 : run->node_rows[of].f[j][i] / most * of_rows[of][MSFP_ROW_F + 2 * j + i][c];
-            }
-            for (int i = 0; i < 2; ++i) {
-                double *column = &d[MSFP_ROW_F + 2 * j + i][c];
-                *column = share * *column + row->f[j][i] / most * (further - share * outward);
-            }
-        }
+        double bounded[MSFP_FRICTION_SIZE * C], *own = d[MSFP_ROW_F + 2 * j];
+        if (of == MSFP_KEPT)
+            continue;
+        msfp_bounded_friction_direction(f[j], of < 0 ? unit : run->node_rows[of].f[j], own,
+                                        of < 0 ? constant[0] : run->gradients->recording.d[of][MSFP_ROW_F + 2 * j], bounded);
+        memcpy(own, bounded, sizeof bounded);
     }
 }
 
@@ -126,10 +123,12 @@ static void limit_row(msfp_run *run, msfp_parameter_batch *batch, int count, msf
     msfp_columns gaps[NB][MSFP_GAP_SIZE];
     double sliding[NB][MSFP_GAP_SIZE];
     msfp_row_limits limits;
+    double f[NB][2];
+    memcpy(f, row->f, sizeof f);
     msfp_gaps_columns(&run->parameters, &batch->parameters, (const double(*)[NQ])row->q,
                       (msfp_columns(*)[NQ])(d + MSFP_ROW_Q), sliding, gaps);
     msfp_limit_row(run->node_rows, count, sliding, row, &limits);
-    limit_friction(run, row, &limits, d);
+    limit_friction(run, (const double(*)[2])f, &limits, d);
     for (int j = 0; j < NB; ++j) {
         memcpy(d[MSFP_ROW_SLIDING + j], gaps[j][MSFP_GAP_S], sizeof *d);
         if (!MSFP_UPLIFT)

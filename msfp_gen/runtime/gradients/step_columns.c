@@ -26,14 +26,12 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_parameter_batch *batch,
         msfp_add_scaled(from->q[0], MSFP_FROM((const double *)&rates, q, 1), batch->h, 1.0,
                         MSFP_COORDINATES + MSFP_INTEGRATED);
     }
-    memcpy(dat->f, from->f, sizeof dat->f);
-    memcpy(dat->foot, from->foot, sizeof dat->foot);
+    msfp_known_of_stage((const double *)from, beta, C, dat->f[0][0], dat->foot[0]);
     for (int c = 0; c < C; ++c) {
         dat->beta[c] = dat->foot_beta[c] = method->gamma * batch->h[c];
-        dat->foot[0][c] += beta * dat->foot[1][c] + dat->beta[c] * stage_history->stage[i].at.foot[1];
+        dat->foot[0][c] += dat->beta[c] * stage_history->stage[i].at.foot[1];
     }
-    msfp_memory_point_columns(&stage_history->stage[i].from, from, beta,
-                              dat MSFP_IF_PACED(&run->parameters, &batch->parameters));
+    msfp_memory_point_columns(&run->parameters, &batch->parameters, &stage_history->stage[i].from, from, beta, dat);
 }
 
 /* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta, at stage i. */
@@ -127,13 +125,10 @@ MSFP_INLINE void stage_state(msfp_run *run, msfp_parameter_batch *batch, int i, 
     memcpy(to->foot, batch->work.foot + MSFP_FOOT_Y * C, sizeof to->foot);
     memcpy(to->dfoot, batch->work.foot + MSFP_FOOT_Y1 * C, sizeof to->dfoot);
 #if MSFP_MEMORY
-    msfp_columns source[NB];
-    for (int j = 0; j < NB; ++j) {
-        memcpy(source[j], batch->work.contact[j] + MSFP_CONTACT_SOURCE * C, sizeof source[j]);
-        add_rates(w->drates[j][MSFP_FRICTION_FORCE_SIZE], x, source[j]);
-    }
-    msfp_memory_state_columns(&stage_history->state[i], from, (const msfp_columns *)source, stage->beta, dat->beta,
-                              to MSFP_IF_PACED(&run->parameters, &batch->parameters));
+    for (int j = 0; j < NB; ++j)
+        add_rates(w->drates[j][MSFP_FRICTION_FORCE_SIZE], x, batch->work.contact[j] + MSFP_CONTACT_SOURCE * C);
+    msfp_memory_state_columns(&run->parameters, &batch->parameters, w, &batch->work, &stage->from, from, stage->beta,
+                              dat->beta, to);
 #endif
     memcpy(to->work, from->work, sizeof to->work);
     memset(to->power, 0, sizeof to->power);

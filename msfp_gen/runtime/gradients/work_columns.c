@@ -50,19 +50,13 @@ MSFP_WIDE void msfp_stage_works(msfp_run *run, msfp_parameter_batch *batch, int 
 enum { ANGLE = 1 };
 
 /* What the work of the next step uses of the end of this one, at the point and evaluation of the batch. */
-static void ends(const msfp_parameter_batch *batch, const msfp_state_columns *before, msfp_history_columns *to)
+static void ends(const msfp_run *run, const msfp_parameter_batch *batch, const msfp_point *at, const msfp_work *w,
+                 msfp_history_columns *to)
 {
-    const msfp_point_columns *dat = &batch->point;
-    memcpy(to->power, before->power, sizeof to->power);
-    msfp_get_polar(batch->work.body[NB] + MSFP_BODY_CX * C, to->way);
-    msfp_add_columns(to->way, dat->base[0], -1.0, 3);
-    memcpy(to->load, dat->load, 3 * sizeof *to->load);
-    memcpy(to->load[3], dat->load[3 + ANGLE], sizeof *to->load);
-    memcpy(to->way[3], dat->base[0][3 + ANGLE], sizeof *to->way);
-    for (int k = 0; k < NB; ++k) {
-        msfp_add_columns(&to->way[3], &dat->q[k][ANGLE], 1.0, 1);
+    memcpy(to->power, batch->now.power, sizeof to->power);
+    msfp_load_end_columns(&run->parameters, &batch->parameters, at, &batch->point, w, &batch->work, to->load_end);
+    for (int k = 0; k < NB; ++k)
         memcpy(to->normal[k], batch->work.contact[k] + MSFP_CONTACT_N * C, sizeof to->normal[k]);
-    }
 }
 
 /* As friction_work of quasistatic.c. */
@@ -89,18 +83,6 @@ static void friction_work(const msfp_run *run, const msfp_parameter_batch *batch
     }
 }
 
-/* As load_work of quasistatic.c. */
-static void load_work(const msfp_run *run, const msfp_parameter_batch *batch, const msfp_history_columns *db,
-                      double *input)
-{
-    const msfp_step_history *a = &run->step_history, *b = &run->next_step_history;
-    const msfp_history_columns *da = &batch->history;
-    for (int i = 0; i < 4; ++i)
-        for (int c = 0; c < C; ++c)
-            input[c] += 0.5 * (da->load[i][c] + db->load[i][c]) * (b->way[i] - a->way[i]) +
-                        0.5 * (a->load[i] + b->load[i]) * (db->way[i][c] - da->way[i][c]);
-}
-
 /* As count_work of quasistatic.c: lengths of these steps do not depend on the parameters. */
 void msfp_quasistatic_works(msfp_run *run, msfp_parameter_batch *batch)
 {
@@ -110,13 +92,16 @@ void msfp_quasistatic_works(msfp_run *run, msfp_parameter_batch *batch)
     msfp_state_columns *next = &batch->next;
     msfp_columns *work = next->work;
     msfp_history_columns reached;
+    msfp_columns load;
     msfp_columns_of_powers(&run->parameters, &batch->parameters, &stage_history->stage[1].at, &batch->point,
                            &stage_history->work[1], &batch->work, next);
     msfp_add_columns(&next->power[MSFP_WORK_INPUT], (const msfp_columns *)&next->load_power, -1.0, 1);
     msfp_parabola_works(batch->history.power[0], now->power[0], next->power[0], run->step_history.h, h, C, work[0]);
-    ends(batch, now, &reached);
+    ends(run, batch, &stage_history->stage[1].at, &stage_history->work[1], &reached);
     friction_work(run, batch, &reached, work);
-    load_work(run, batch, &reached, work[MSFP_WORK_INPUT]);
+    msfp_load_work_direction(run->step_history.load_end, run->next_step_history.load_end, batch->history.load_end,
+                             reached.load_end, load);
+    msfp_add_columns(&work[MSFP_WORK_INPUT], (const msfp_columns *)&load, 1.0, 1);
     batch->history = reached;
 }
 #endif
@@ -135,7 +120,7 @@ void msfp_initial_works(msfp_run *run, msfp_parameter_batch *batch, const msfp_p
     if (!msfp_is_quasistatic(run))
         return;
     msfp_add_columns(&now->power[MSFP_WORK_INPUT], (const msfp_columns *)&now->load_power, -1.0, 1);
-    ends(batch, now, &batch->history);
+    ends(run, batch, at, w, &batch->history);
 #endif
 }
 #endif

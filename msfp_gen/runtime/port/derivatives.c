@@ -87,6 +87,7 @@ static void differentiate(const msfp_parameters *p, const msfp_work *w, int bala
     msfp_top_by_ends(p, w, s, d);
     msfp_forces_by_ends(p, w, s, d);
     msfp_surfaces_by_ends(p, w, s, d);
+    msfp_results_by_ends(p, w, s, d);
     if (balances)
         msfp_moments_by_ends(p, w, s, d);
 }
@@ -105,40 +106,55 @@ static void point(const state_columns *known, double beta, state_columns *stage,
         }
 }
 
-/* What the stage formulas of friction, memory and foot know of the earlier stages. */
-static void known_of_stage(const msfp_parameters *p, const state_columns *known, double beta, msfp_by_ends *d)
-{
-    for (int j = 0; j < NB; ++j) {
-        memcpy(d->friction_previous[j] + MSFP_FRICTION_PREVIOUS_Y * W, known->f[j],
-               MSFP_FRICTION_FORCE_SIZE * sizeof(columns));
 #if MSFP_MEMORY
-        msfp_memory_past(known->memory[j][0], beta, W,
-                         d->friction_previous[j] + MSFP_FRICTION_PREVIOUS_PAST * W MSFP_IF_PACED(p->surface[j][MSFP_PACE]));
+static const double part[MSFP_MEMORY][MSFP_MEMORY_PART_SIZE] = MSFP_MEMORY_PARTS;
+#endif
+
+/* What the stage formulas of friction, memory and foot know of the earlier stages. */
+static void known_of_stage(const msfp_parameters *p, const msfp_stage *at, const state_columns *known, msfp_by_ends *d)
+{
+    const double beta = at->beta;
+    columns f[NB][2];
+    msfp_known_of_stage((const double *)known, beta, W, f[0][0], d->foot_stage + MSFP_FOOT_STAGE_Y * W);
+    for (int j = 0; j < NB; ++j) {
+        memcpy(d->friction_previous[j] + MSFP_FRICTION_PREVIOUS_Y * W, f[j], MSFP_FRICTION_FORCE_SIZE * sizeof(columns));
+#if MSFP_MEMORY
+        double *past = d->friction_previous[j] + MSFP_FRICTION_PREVIOUS_PAST * W;
+        memset(past, 0, sizeof(columns));
+        for (int i = 0; i < MSFP_MEMORY; ++i) {
+            columns one;
+            msfp_memory_past_by_ends(part[i], p->surface[j], &beta, &at->from.memory[j][i], known->memory[j][i], one);
+            msfp_add(past, one, 1.0, W);
+        }
 #endif
     }
     (void)p;
-    for (int c = 0; c < W; ++c)
-        d->foot_stage[MSFP_FOOT_STAGE_Y * W + c] = known->foot[0][c] + beta * known->foot[1][c];
-    memcpy(d->foot_stage + MSFP_FOOT_STAGE_Y1 * W, known->foot[1], sizeof(columns));
 }
+MSFP_STATIC_ASSERT(MSFP_FOOT_STAGE_Y1 == MSFP_FOOT_STAGE_Y + 1, rate_follows_height);
 
 /* Y and Z, foot and memories of the solved stage, with their rates. */
-static void rest_of_stage(const msfp_parameters *p, const state_columns *known, double beta, const msfp_by_ends *d,
-                          state_columns *stage)
+static void rest_of_stage(const msfp_parameters *p, const msfp_work *w, const msfp_stage *at, const state_columns *known,
+                          const msfp_by_ends *d, state_columns *stage)
 {
     memcpy(stage->f, known->f, sizeof stage->f);
     memcpy(stage->foot, known->foot, sizeof stage->foot);
     for (int j = 0; j < NB; ++j) {
-        memcpy(stage->df[j], d->contact[j] + MSFP_CONTACT_DY * W, MSFP_FRICTION_FORCE_SIZE * sizeof(columns));
+        memcpy(stage->df[j], d->surface_results[j] + MSFP_SURFACE_RESULTS_DY * W, MSFP_FRICTION_FORCE_SIZE * sizeof(columns));
 #if MSFP_MEMORY
-        msfp_memory_stage(known->memory[j][0], d->contact[j] + MSFP_CONTACT_SOURCE * W, beta, W, stage->memory[j][0],
-                          stage->dmemory[j][0] MSFP_IF_PACED(p->surface[j][MSFP_PACE]));
+        for (int i = 0; i < MSFP_MEMORY; ++i) {
+            double end[MSFP_MEMORY_END_SIZE * W];
+            msfp_memory_stage_by_ends(part[i], p->surface[j], &at->beta, &at->from.memory[j][i], w->contact[j],
+                                      known->memory[j][i], d->contact[j], end);
+            memcpy(stage->memory[j][i], end + MSFP_MEMORY_END_M * W, sizeof(columns));
+            memcpy(stage->dmemory[j][i], end + MSFP_MEMORY_END_D * W, sizeof(columns));
+        }
 #endif
     }
     (void)p;
+    (void)w;
     memcpy(stage->dfoot, d->foot + MSFP_FOOT_Y1 * W, sizeof stage->dfoot);
-    msfp_add(stage->f[0][0], stage->df[0][0], beta, 2 * NB * W);
-    msfp_add(stage->foot[0], stage->dfoot[0], beta, 2 * W);
+    msfp_add(stage->f[0][0], stage->df[0][0], at->beta, 2 * NB * W);
+    msfp_add(stage->foot[0], stage->dfoot[0], at->beta, 2 * W);
 }
 
 /* Derivatives of the rates of the stage, by the tangent of the balances as Newton's method divides them. */
@@ -152,7 +168,7 @@ static void solve(const msfp_run *run, const double *residual, const msfp_by_end
         memcpy(own + NA * W, d->excess[k], (ND - NA) * sizeof(columns));
         (void)residual;
 #else
-        msfp_divide_columns(run->work.contact[k][MSFP_CONTACT_N], residual + k * ND, d->contact[k] + MSFP_CONTACT_N * W, W,
+        msfp_divide_columns(run->work.contact[k][MSFP_CONTACT_N], residual + k * ND, d->surface_results[k] + MSFP_SURFACE_RESULTS_N * W, W,
                             own);
 #endif
     }
@@ -179,14 +195,14 @@ static void differentiate_stage(const msfp_port *port, const msfp_run *run, cons
             }
     move_base(&run->parameters, &run->work, here[0], s, &m->d);
     move_top(port, &run->work, here[1], s, &m->d);
-    known_of_stage(&run->parameters, &known, beta, &m->d);
+    known_of_stage(&run->parameters, &stages->now, &known, &m->d);
     memset(stage, 0, sizeof *stage);
     point(&known, beta, stage, &m->d);
     differentiate(&run->parameters, &run->work, 1, s, &m->d);
     solve(run, residual, &m->d, stage);
     point(&known, beta, stage, &m->d);
     differentiate(&run->parameters, &run->work, balances, s, &m->d);
-    rest_of_stage(&run->parameters, &known, beta, &m->d, stage);
+    rest_of_stage(&run->parameters, &run->work, &stages->now, &known, &m->d, stage);
     if (i == stages->method->stages - 1) /* at the end of the step */
         m->stage[0] = *stage;
 }
@@ -221,9 +237,7 @@ static int repeat(msfp_port *port, msfp_run *run, moved *m)
         for (int i = 1; i < s.method->stages; ++i) {
             const double t = run->now.t + s.method->c[i] * s.h;
             const int last = step + 1 == port->time_count && i + 1 == s.method->stages;
-            msfp_stage_begin(run, &s, i);
-            msfp_point_at(run, t, &s.now.at);
-            int status = msfp_stage_solve(run, &s, i);
+            int status = msfp_stage_take(run, &s, i);
             if (status == MSFP_OK)
                 status = msfp_factorise_stage(run, &s.now, residual, &size);
             if (status)
@@ -256,7 +270,7 @@ static void give_row(const moved *m, double *rows)
     memcpy(rows + MSFP_ROW_A * W, end->a, sizeof end->a);
     memcpy(rows + MSFP_ROW_F * W, end->f, sizeof end->f);
     for (int j = 0; j < NB; ++j) {
-        memcpy(rows + (MSFP_ROW_NORMAL + j) * W, d->contact[j] + MSFP_CONTACT_N * W, sizeof(columns));
+        memcpy(rows + (MSFP_ROW_NORMAL + j) * W, d->surface_results[j] + MSFP_SURFACE_RESULTS_N * W, sizeof(columns));
         memcpy(rows + (MSFP_ROW_SLIDING + j) * W, d->gap[j] + MSFP_GAP_S * W, sizeof(columns));
     }
     memcpy(rows + MSFP_ROW_FORCE * W, d->force[0], NB * 3 * sizeof(columns));

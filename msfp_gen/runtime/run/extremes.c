@@ -15,7 +15,6 @@ typedef struct {
 static const field fields[] = { MSFP_EXTREMES };
 enum { FIELDS = sizeof fields / sizeof *fields };
 
-static double length(const double *v) { return sqrt(v[0] * v[0] + v[1] * v[1]); }
 
 /* The numbers of a row that a field is of. */
 MSFP_INLINE const double *numbers_of(const field *f, const msfp_row *row, const double *across)
@@ -23,27 +22,31 @@ MSFP_INLINE const double *numbers_of(const field *f, const msfp_row *row, const 
     return f->of < MSFP_ACROSS ? (const double *)row + f->of : across;
 }
 
-MSFP_INLINE double value_of(const field *f, const double *u, int k)
+/* The pair of numbers of which number k of a field is the length, and how many of the pair are numbers of a row: one, with
+ * zero, for a magnitude; none for a number with its sign, which is the first of the pair. of: place of the first. */
+MSFP_INLINE int pair_of(const field *f, const double *u, int k, int *of, double pair[2])
 {
-    if (f->how == MSFP_VECTOR)
-        return k < 3 ? fabs(u[k]) : length(u);
-    if (f->how == MSFP_OPENING)
-        return u[k] < 0.0 ? -u[k] : 0.0;
-    return f->how == MSFP_LENGTH ? length(u + 2 * k) : u[k];
+    const int radial = f->how == MSFP_VECTOR && k == 3, count = radial || f->how == MSFP_LENGTH ? 2 : 1;
+    const int first = radial ? 0 : k * count;
+    *of = f->of + first;
+    pair[0] = f->how == MSFP_OPENING && !(u[first] < 0.0) ? 0.0 : u[first];
+    pair[1] = count > 1 ? u[first + 1] : 0.0;
+    return f->how == MSFP_NUMBER ? 0 : count;
 }
 
-int msfp_extreme_slopes(int index, const msfp_row *row, const double *across, int *of, double slopes[2])
+static double value_of(const field *f, const double *u, int k)
+{
+    int of;
+    double pair[2];
+    return pair_of(f, u, k, &of, pair) ? msfp_length_of(pair) : pair[0];
+}
+
+int msfp_extreme_pair(int index, const msfp_row *row, const double *across, int *of, double pair[2])
 {
     const field *f = fields;
     while (index >= f->count)
         index -= f++->count;
-    const int radial = f->how == MSFP_VECTOR && index == 3, count = radial || f->how == MSFP_LENGTH ? 2 : 1;
-    const int first = radial ? 0 : index * count;
-    const double *u = numbers_of(f, row, across), value = value_of(f, u, index);
-    for (int i = 0; i < count; ++i)
-        slopes[i] = f->how == MSFP_NUMBER ? 1.0 : value > 0.0 ? u[first + i] / value : 0.0; /* of an opening -1 */
-    *of = f->of + first;
-    return count;
+    return pair_of(f, numbers_of(f, row, across), index, of, pair);
 }
 
 /* Whether a surface carries a normal force; where it may open, a remainder of N is left that keeps friction defined. */
@@ -83,7 +86,7 @@ static double across(const msfp_run *run, const msfp_row *row)
 {
     double displacement[3];
     msfp_displacement_across(run, row, displacement);
-    return length(displacement);
+    return msfp_length_of(displacement);
 }
 
 /* Rate of the squared horizontal displacement, over 2 [m^2/s], at the evaluation in run->work. */
@@ -119,7 +122,7 @@ static void take_nodes(msfp_run *run)
 {
     msfp_row row;
     for (int i = 0; i < run->node_count && msfp_control_order(run->options.method) > 3.0; ++i)
-        if (length(run->node[i].top_force) > run->extremes.top_force[3]) {
+        if (msfp_length_of(run->node[i].top_force) > run->extremes.top_force[3]) {
             msfp_row_inside(run, run->node[i].share, &row);
             take(run, &row, run->node[i].share, OF_TOP_FORCE);
         }

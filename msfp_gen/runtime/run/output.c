@@ -56,25 +56,22 @@ static void blend(const msfp_row *rows, const msfp_weights *w, msfp_row *out)
 /* |(Y, Z)| no larger than in the rows that a row is interpolated from: at a reversal a polynomial may exceed them. */
 static void limit_friction(const msfp_row *rows, int count, msfp_row *row, msfp_row_limits *limits)
 {
+    static const double unit[2] = { 1.0, 0.0 };
     for (int j = 0; j < NB; ++j) {
         const double size = msfp_hypot(row->f[j][0], row->f[j][1]);
         double most = 1.0;
-        limits->row[j] = -1;
-        limits->share[j] = 1.0;
+        int largest = MSFP_UNIT;
         for (int r = 0; r < count && size > 1.0; ++r) {
             /* `count` rows are set. NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage) */
             const double other = msfp_hypot(rows[r].f[j][0], rows[r].f[j][1]);
             if (other > most) {
                 most = other;
-                limits->row[j] = r;
+                largest = r;
             }
         }
-        limits->most[j] = most;
-        if (size <= most)
-            continue;
-        limits->share[j] = most / size;
-        for (int d = 0; d < 2; ++d)
-            row->f[j][d] *= limits->share[j];
+        limits->row[j] = size > most ? largest : MSFP_KEPT;
+        if (size > most)
+            msfp_bound_friction(row->f[j], largest < 0 ? unit : rows[largest].f[j]);
     }
 }
 

@@ -32,7 +32,7 @@ static int solve_initial_state(msfp_run *run)
     if (status)
         return status;
     msfp_state_of(run, &at, at.f, &run->now);
-    msfp_memory_state(&run->work, &run->now, 0.0, &run->now MSFP_IF_PACED(&run->parameters));
+    msfp_memory_state(&run->parameters, &run->work, &run->now, 0.0, &run->now);
     msfp_powers_of(run, &at, &run->now);
     msfp_energy_balance_begin(run, &at);
     memset(run->acceleration_slope, 0, sizeof run->acceleration_slope);

@@ -31,9 +31,10 @@ void msfp_monitor_begin(msfp_run *run);
 /* ---- extremes.c ---- */
 
 enum { MSFP_EXTREME_COUNT = sizeof(msfp_extremes) / sizeof(double), MSFP_ACROSS = MSFP_ROW_SIZE };
-/* Derivatives of number `index` of the extremes at a row: returns with respect to how many numbers, 1 or 2. across [3]:
- * the displacement there. of: the first of these numbers; from MSFP_ACROSS on: displacement across the bearing. */
-int msfp_extreme_slopes(int index, const msfp_row *row, const double *across, int *of, double slopes[2]);
+/* The numbers of a row of which number `index` of the extremes is the length: returns how many, 1 or 2, with a zero in place
+ * of the second; 0: the first number itself. across [3]: the displacement there. of: place of the first of these numbers;
+ * from MSFP_ACROSS on: displacement across the bearing. */
+int msfp_extreme_pair(int index, const msfp_row *row, const double *across, int *of, double pair[2]);
 /* Extremes of the first row. */
 void msfp_extremes_begin(msfp_run *run, const msfp_row *row);
 /* Extremes with those of the accepted step, after its rows are written. */
@@ -63,10 +64,10 @@ int msfp_write_row(msfp_run *run, const msfp_state *s);
 int msfp_write_step(msfp_run *run);
 /* Bounds of a row inside a step, which its interpolating polynomial may exceed. */
 typedef struct {
-    double share[MSFP_NB], most[MSFP_NB]; /* Y, Z times `share` have the size `most` [-]; share 1: they are kept */
-    int row[MSFP_NB];                     /* of those it is interpolated from, that which has this size; -1: none */
-    int zero_count, zero[MSFP_ROW_SIZE];  /* numbers that are set to zero */
+    int row[MSFP_NB]; /* of those it is interpolated from, that to whose size Y, Z are scaled; or one of these: */
+    int zero_count, zero[MSFP_ROW_SIZE]; /* numbers that are set to zero */
 } msfp_row_limits;
+enum { MSFP_KEPT = -2, MSFP_UNIT }; /* Y, Z are kept, or scaled to the size 1 */
 /* Set these in a row that is interpolated from `count` rows; sliding: as of msfp_gaps, at its angles. */
 void msfp_limit_row(const msfp_row *rows, int count, double sliding[MSFP_NB][MSFP_GAP_SIZE], msfp_row *row,
                     msfp_row_limits *limits);

@@ -54,7 +54,7 @@ static void stage_point(msfp_run *run, const msfp_state *stages, int i, double h
 {
     *from = run->now;
     msfp_add_rates(from, stages, a[i], i, h);
-    msfp_place(from, at MSFP_IF_PACED(&run->parameters));
+    msfp_place(&run->parameters, from, at);
 }
 
 /* Integrals of the energy balance by Simpson's rule: the power of a rim damper is a peak that lasts only a few
@@ -139,7 +139,7 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
         const int status = rates_at(run, &at, &k[i]);
         if (status)
             return status;
-        msfp_memory_state(&run->work, &from, 0.0, &k[i] MSFP_IF_PACED(&run->parameters));
+        msfp_memory_state(&run->parameters, &run->work, &from, 0.0, &k[i]);
     }
     msfp_add_rates(&estimate, k, e, STAGES, h);
     *error = fmax(msfp_error_norm(run, &estimate, 1), msfp_memory_error(run, &estimate, &k[STAGES - 1], 0.0));

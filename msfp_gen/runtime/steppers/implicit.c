@@ -14,12 +14,10 @@ void msfp_stage_begin(msfp_run *run, msfp_stages *s, int i)
     msfp_state *from = &s->now.from;
     memcpy(from, &run->now, offsetof(msfp_state, a)); /* without rates */
     msfp_add_rates(from, s->stage, s->method->a[i], i, s->h);
-    memcpy(s->now.weights.fp, from->f, sizeof from->f);
-    s->now.at.foot[0] = from->foot[0] + s->now.beta * from->foot[1];
-    s->now.at.foot[1] = from->foot[1];
+    msfp_known_of_stage((const double *)from, s->now.beta, 1, s->now.weights.fp[0], s->now.at.foot);
     s->now.at.foot_beta = s->now.beta;
     s->now.weights.same_base = 0;
-    msfp_memory_point(from, s->now.beta, &s->now.at MSFP_IF_PACED(&run->parameters));
+    msfp_memory_point(&run->parameters, from, s->now.beta, &s->now.at);
 }
 
 /* Rate j of body k at stage i, extrapolated from the earlier stages. */
@@ -35,14 +33,11 @@ static double extrapolated_rate(const msfp_run *run, const msfp_stages *s, int i
     return v;
 }
 
-/* Rate j of body k at stage i from an acceleration extrapolated linearly, as a base acceleration linear in time
- * causes. */
+/* The same from its acceleration, where the motion is sampled. */
 static double rate_of_extrapolated_acceleration(const msfp_run *run, const msfp_stages *s, int i, int k, int j, double h)
 {
-    const double *c = s->method->c;
-    const double first = s->stage[0].a[k][j];
-    const double change = i > 1 ? (s->stage[i - 1].a[k][j] - first) / c[i - 1] : h * run->acceleration_slope[k][j];
-    return s->now.from.v[k][j] + s->now.beta * (first + c[i] * change);
+    return msfp_guess_rate(s->method->c, i, s->now.from.v[k][j], s->now.beta, s->stage[0].a[k][j], s->stage[i - 1].a[k][j],
+                           h * run->acceleration_slope[k][j]);
 }
 
 /* First guess of stage i. */
@@ -75,6 +70,13 @@ int msfp_stage_solve(msfp_run *run, msfp_stages *s, int i)
         status = msfp_solve_stage(run, &s->now);
     }
     return status;
+}
+
+int msfp_stage_take(msfp_run *run, msfp_stages *s, int i)
+{
+    msfp_stage_begin(run, s, i);
+    msfp_point_at(run, run->now.t + s->method->c[i] * s->h, &s->now.at);
+    return msfp_stage_solve(run, s, i);
 }
 
 /* Where the solution is smooth, third-order weights integrate the work: they see the curvature of power over a long
@@ -117,7 +119,7 @@ void msfp_stage_end(msfp_run *run, msfp_stages *s, int i)
     stage->energy = 0.0; /* known once the step is accepted */
     msfp_state_of(run, &s->now.at, s->now.f, stage);
     msfp_powers_of(run, &s->now.at, stage);
-    msfp_memory_state(&run->work, &s->now.from, s->now.beta, stage MSFP_IF_PACED(&run->parameters));
+    msfp_memory_state(&run->parameters, &run->work, &s->now.from, s->now.beta, stage);
     for (int e = 0; e < MSFP_WORKS; ++e)
         stage->work[e] = s->now.from.work[e] + s->h * s->method->gamma * stage->power[e];
     if (run->node_count < MSFP_NODES && i == s->method->nodes[run->node_count]) {
@@ -221,9 +223,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     msfp_stages s;
     msfp_stages_begin(run, &s, h);
     for (int i = 1; i < s.method->stages; ++i) {
-        msfp_stage_begin(run, &s, i);
-        msfp_point_at(run, run->now.t + s.method->c[i] * h, &s.now.at);
-        const int status = msfp_stage_solve(run, &s, i);
+        const int status = msfp_stage_take(run, &s, i);
         if (status)
             return status;
         msfp_stage_end(run, &s, i);

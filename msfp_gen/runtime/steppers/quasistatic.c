@@ -18,28 +18,19 @@ int msfp_is_quasistatic(const msfp_run *run)
 enum { ANGLE = 1 }; /* theta, the unknown of a planar body */
 static const double largest_change = 0.4; /* of Y in a step, as extrapolated */
 
-/* What the next step uses of a state. */
-static void store_state(msfp_step_history *to, const msfp_point *at, const msfp_work *w)
+/* What the next step uses of the evaluation in `w`. */
+static void store_state(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, msfp_step_history *to)
 {
-    double C[3];
-    msfp_body_C_get(w->body[NB], C);
-    for (int i = 0; i < 3; ++i) {
-        to->load[i] = at->load[i];
-        to->way[i] = C[i] - at->base[0][i];
-    }
-    to->load[3] = at->load[3 + ANGLE];
-    to->way[3] = at->base[0][3 + ANGLE];
-    for (int k = 0; k < NB; ++k) {
-        to->way[3] += at->q[k][ANGLE];
+    msfp_end_of_load(p, at, w, to->load_end);
+    for (int k = 0; k < NB; ++k)
         to->normal[k] = w->contact[k][MSFP_CONTACT_N];
-    }
 }
 
 void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at, double load_power)
 {
     run->step_history.h = run->step_history.span = 0.0;
     memset(run->step_history.jerk, 0, sizeof run->step_history.jerk);
-    store_state(&run->step_history, at, &run->work);
+    store_state(&run->parameters, at, &run->work, &run->step_history);
     if (msfp_is_quasistatic(run)) /* the work of the load is summed separately */
         run->now.power[MSFP_WORK_INPUT] -= load_power;
 }
@@ -173,16 +164,6 @@ static void friction_work(const msfp_run *run, double work[MSFP_WORKS])
     }
 }
 
-/* Work of the load, from the displacement and rotation of the top. */
-static double load_work(const msfp_run *run)
-{
-    const msfp_step_history *from = &run->step_history, *to = &run->next_step_history;
-    double work = 0.0;
-    for (int i = 0; i < 4; ++i)
-        work += 0.5 * (from->load[i] + to->load[i]) * (to->way[i] - from->way[i]);
-    return work;
-}
-
 /* Work of the step: of friction and load from slip and displacement, exact for any length; of the remaining input and
  * of small dampers from the parabola through three powers. */
 static void count_work(msfp_run *run, const msfp_stage *s, double h)
@@ -194,7 +175,7 @@ static void count_work(msfp_run *run, const msfp_stage *s, double h)
     next->power[MSFP_WORK_INPUT] -= parts.load;
     msfp_parabola_works(run->step_history.power, run->now.power, next->power, run->step_history.h, h, 1, next->work);
     friction_work(run, next->work);
-    next->work[MSFP_WORK_INPUT] += load_work(run);
+    next->work[MSFP_WORK_INPUT] += msfp_work_of_load(run->step_history.load_end, run->next_step_history.load_end);
 }
 
 static void finish(msfp_run *run, msfp_stage *s, double h)
@@ -220,7 +201,7 @@ static void finish(msfp_run *run, msfp_stage *s, double h)
     run->next_step_history.h = h;
     run->next_step_history.span = run->step_history.h > 0 ? h + run->step_history.h : 0.0;
     memcpy(run->next_step_history.power, now->power, sizeof now->power);
-    store_state(&run->next_step_history, &s->at, &run->work);
+    store_state(&run->parameters, &s->at, &run->work, &run->next_step_history);
 }
 
 int msfp_step_quasistatic(msfp_run *run, double h, double *error)

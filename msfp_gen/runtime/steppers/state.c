@@ -76,20 +76,21 @@ void msfp_powers_of(const msfp_run *run, const msfp_point *at, msfp_state *s)
     s->load_power = parts.load;
 }
 
-void msfp_place(const msfp_state *s, msfp_point *at MSFP_IF_PACED(const msfp_parameters *p))
+void msfp_place(const msfp_parameters *p, const msfp_state *s, msfp_point *at)
 {
+    (void)p;
     memcpy(at->q, s->q, sizeof at->q);
     memcpy(at->v, s->v, sizeof at->v);
     memcpy(at->f, s->f, sizeof at->f);
     memcpy(at->foot, s->foot, sizeof at->foot);
-    msfp_memory_point(s, 0.0, at MSFP_IF_PACED(p));
+    msfp_memory_point(p, s, 0.0, at);
 }
 
 void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
 {
     memset(at, 0, sizeof *at);
     msfp_point_at(run, s->t, at);
-    msfp_place(s, at MSFP_IF_PACED(&run->parameters));
+    msfp_place(&run->parameters, s, at);
     memcpy(at->a, s->a, sizeof at->a);
 }
 

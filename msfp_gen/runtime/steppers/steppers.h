@@ -4,6 +4,7 @@
  */
 #ifndef MSFP_STEPPERS_H
 #define MSFP_STEPPERS_H
+#include <string.h>
 #include "equations.h"
 
 /* ---- tableaux.c: stiffly accurate ESDIRK methods as data ---- */
@@ -27,7 +28,7 @@ double msfp_control_order(int method);
 /* Base motion, load and rotation of the support at time t [s], into `at`. */
 void msfp_point_at(msfp_run *run, double t, msfp_point *at);
 /* The integrated quantities of a state, into `at`. */
-void msfp_place(const msfp_state *s, msfp_point *at MSFP_IF_PACED(const msfp_parameters *p));
+void msfp_place(const msfp_parameters *p, const msfp_state *s, msfp_point *at);
 /* All inputs of an evaluation at a state. */
 void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at);
 /* Weights of the start of the last step, its interpolation nodes and its end in the polynomial through all of them. */
@@ -66,9 +67,20 @@ MSFP_INLINE void msfp_weigh(const double *weights, int items, const double *cons
 MSFP_INLINE void msfp_sum_rates(double *sum, const double *states, size_t size, const double *weights, int count,
                                 double h, int width)
 {
-    for (int j = 0; j < count; ++j, states += size) {
-        msfp_add(MSFP_FROM(sum, q, width), MSFP_FROM(states, v, width), h * weights[j], MSFP_COORDINATES * width);
-        msfp_add(MSFP_FROM(sum, v, width), MSFP_FROM(states, a, width), h * weights[j], MSFP_INTEGRATED * width);
+    msfp_sum_stages(MSFP_FROM(sum, q, width), MSFP_FROM(states, v, width), size, weights, count, h,
+                    MSFP_COORDINATES * width);
+    msfp_sum_stages(MSFP_FROM(sum, v, width), MSFP_FROM(states, a, width), size, weights, count, h,
+                    MSFP_INTEGRATED * width);
+}
+/* What the formulas of a stage know of the earlier ones: Y, Z; for the foot of the supported mass y and y' as in msfp_point.
+ * from: sum of the start of the step and those rates. */
+MSFP_INLINE void msfp_known_of_stage(const double *from, double beta, int width, double *f, double *foot)
+{
+    const double *y = MSFP_FROM(from, foot, width), *y1 = y + width;
+    memcpy(f, MSFP_FROM(from, f, width), 2 * NB * width * sizeof *f);
+    for (int c = 0; c < width; ++c) {
+        foot[c] = y[c] + beta * y1[c];
+        foot[width + c] = y1[c];
     }
 }
 /* The cubics through `count` values y and rates d at the ends of a step of length h, at its share s. */
@@ -166,7 +178,9 @@ typedef struct {
 /* Begin a step of length h [s]. */
 void msfp_stages_begin(msfp_run *run, msfp_stages *s, double h);
 /* For each stage i from 1 on: begin; base, load and support into s->now.at; solve, which may be repeated for others of
- * these; end. The point s->now.at and run->work are then at the solution. */
+ * these; end. The point s->now.at and run->work are then at the solution. msfp_stage_take begins and solves with the
+ * histories of the run. */
+int msfp_stage_take(msfp_run *run, msfp_stages *s, int i);
 void msfp_stage_begin(msfp_run *run, msfp_stages *s, int i);
 int msfp_stage_solve(msfp_run *run, msfp_stages *s, int i);
 void msfp_stage_end(msfp_run *run, msfp_stages *s, int i);

@@ -17,7 +17,8 @@ from msfp_gen import Effects, Layout
 from msfp_gen.generator import generate
 from msfp_gen.generator.derive import Equations, derive
 from msfp_gen.generator.lower import GRADIENT_COLUMNS
-from msfp_gen.generator.schedule import beside, calls_of, output_is_stored, passes_of
+from msfp_gen.generator.places import calls_of, output_is_stored, passes_of
+from msfp_gen.generator.schedule import beside
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.specification.layout import ModelSpec
@@ -282,3 +283,68 @@ def test_the_foot_at_rest_carries_the_weight(top: Kernels, mass: float, stiffnes
     for name, slope in want.items():
         assert top.slopes("resting_foot", "par", name, **given)["y"] == pytest.approx(slope, rel=1e-14)
     assert top.slopes("resting_foot", "b", "Cz", **given)["y"] == 1.0
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory: pytest.TempPathFactory) -> Kernels:
+    return Kernels(tmp_path_factory.mktemp("rows"), ("extreme_length", "bounded_friction", "gap_at"), {})
+
+
+def test_lengths_have_a_kink_at_zero(rows: Kernels) -> None:
+    """Of an extreme, and of the sliding displacement: there their derivatives count as zero."""
+    pair = {"v": {"x": 0.3, "y": -0.4}}
+    assert rows("extreme_length", **pair) == pytest.approx({"value": 0.5}, rel=1e-15)
+    for name, slope in (("x", 0.6), ("y", -0.8)):
+        assert rows.slopes("extreme_length", "v", name, **pair)["value"] == pytest.approx(slope, rel=1e-15)
+        assert rows.slopes("extreme_length", "v", name, v={})["value"] == 0.0
+    dish = {"R": 2.0, "sc": 0.3}
+    assert rows("gap_at", par=dish, x={}) == {"s": 0.0, "g": 0.3}
+    assert rows.slopes("gap_at", "par", "sc", par=dish, x={}) == {"s": 0.0, "g": 1.0}
+    for tilt, slope in ((0.0, 0.0), (0.1, 2.0), (-0.1, -2.0)):
+        found = rows.slopes("gap_at", "x", "theta", par=dish, x={"theta": tilt})
+        assert found == pytest.approx({"s": slope, "g": -slope}, rel=1e-14)
+
+
+def test_friction_is_scaled_to_the_size_of_another(rows: Kernels) -> None:
+    """The size follows the other row alone, the direction the own one alone."""
+    given = {"f": {"Y": 0.9, "Z": -1.2}, "m": {"Y": 0.6, "Z": 1.0}}
+    found, most = rows("bounded_friction", **given), np.hypot(0.6, 1.0)
+    assert found == pytest.approx({"Y": 0.6 * most, "Z": -0.8 * most}, rel=1e-15)
+    across = {"Y": 0.8 * 0.8, "Z": 0.6 * 0.8}  # of a change along Y its part across the direction
+    by_own = rows.slopes("bounded_friction", "f", "Y", **given)
+    assert by_own == pytest.approx({name: value * most / 1.5 for name, value in across.items()}, rel=1e-14)
+    by_most = rows.slopes("bounded_friction", "m", "Z", **given)
+    assert by_most == pytest.approx({"Y": 0.6 / most, "Z": -0.8 / most}, rel=1e-14)
+
+
+@mp.workdps(30)
+def test_a_part_of_a_memory_solves_its_stage_formula(tmp_path: Path) -> None:
+    """m = before + beta d with d = weight source - pace rate m, and what earlier stages and source contribute to it."""
+    names = ("memory_past", "memory_gain", "memory_stage")
+    kernels = Kernels(tmp_path, names, {"friction": "pvtd", "dimension": "planar"})
+    numbers = {"rate": 3.0, "weight": 0.7, "pace": 2.5, "beta": 0.02, "before": 40.0, "source": 900.0}
+
+    def stage(rate: mp.mpf, weight: mp.mpf, pace: mp.mpf, beta: mp.mpf, before: mp.mpf, source: mp.mpf) -> list[mp.mpf]:
+        m = (before + beta * weight * source) / (1 + beta * pace * rate)
+        return [m, weight * source - pace * rate * m]
+
+    given = {
+        "k": {"rate": numbers["rate"], "weight": numbers["weight"]},
+        "par": {"plate_rate": numbers["pace"]},
+        "h": {"beta": numbers["beta"]},
+        "m": {"m": numbers["before"]},
+        "c": {"source": numbers["source"]},
+    }
+    exact = {name: mp.mpf(value) for name, value in numbers.items()}
+    m, d = stage(**exact)
+    assert m == exact["before"] + exact["beta"] * d
+    assert kernels("memory_stage", **given) == pytest.approx({"m": float(m), "d": float(d)}, rel=1e-14)
+    past, gain = (kernels(name, **given) for name in ("memory_past", "memory_gain"))
+    assert past["past"] + gain["gain"] * numbers["source"] == pytest.approx(float(m), rel=1e-14)
+    inputs = {"pace": ("par", "plate_rate"), "beta": ("h", "beta"), "before": ("m", "m"), "source": ("c", "source")}
+    for name, (alias, field) in inputs.items():
+        step = exact[name] * mp.mpf("1e-9")
+        low, high = (stage(**exact | {name: exact[name] + sign * step}) for sign in (-1, 1))
+        slopes = kernels.slopes("memory_stage", alias, field, **given)
+        want = [float((b - a) / (2 * step)) for a, b in zip(low, high, strict=True)]
+        assert [slopes["m"], slopes["d"]] == pytest.approx(want, rel=1e-12), name

@@ -11,22 +11,13 @@ from pathlib import Path
 import pytest
 
 from msfp_gen import Effects, Layout
-from msfp_gen.generator import directions, drivers
+from msfp_gen.generator import directions, drivers, places
 from msfp_gen.generator import schedule as schedules
 from msfp_gen.generator.derive import Equations, derive
 from msfp_gen.generator.lower import lower
+from msfp_gen.generator.places import Call, Pass, Schedule, calls_of, check, passes_of
 from msfp_gen.generator.program import Program
-from msfp_gen.generator.schedule import (
-    Call,
-    Pass,
-    Schedule,
-    calls_of,
-    check,
-    condensed,
-    momentum_balances,
-    passes_of,
-    unknowns,
-)
+from msfp_gen.generator.schedule import condensed, momentum_balances, unknowns
 from msfp_gen.specification.layout import ModelSpec
 
 EFFECTS = [
@@ -109,7 +100,8 @@ def test_unknowns_are_as_many_as_balances(dimension: str, count: int) -> None:
 
 def test_the_schedule_has_no_text_in_c() -> None:
     """Nodes alone: `drivers.py` knows how each is written, with constants, arguments and members of C."""
-    source = re.sub(r'""".*?"""', "", inspect.getsource(schedules), flags=re.DOTALL)
+    text = inspect.getsource(schedules) + inspect.getsource(places)
+    source = re.sub(r'""".*?"""', "", text, flags=re.DOTALL)
     assert not re.search(r"MSFP_|msfp_(?!gen)|\w->|\[j\];|NULL", source)
 
 
@@ -131,7 +123,7 @@ def test_arguments_that_a_driver_does_not_name_are_marked() -> None:
 def test_variables_of_a_step_are_quantities_of_their_blocks(name: str) -> None:
     """A quantity that was renamed would be left out of derivatives in silence."""
     blocks = equations_of(uplift=True).blocks
-    known = set(schedules.block_of(name, blocks).quantities)
+    known = set(places.block_of(name, blocks).quantities)
     assert {q for parts in schedules.VARIABLES.values() for one, many in parts for q in many if one == name} <= known
 
 
