@@ -323,9 +323,10 @@ def check_beside_noise(
 ) -> None:
     """Every derivative agrees as exactly as differences know it: stiff contacts magnify the last digit of the runs.
 
-    sizes: of steps over the parameter; of each quantity the difference that is known best counts: small steps
-    suffer from rounding, and large ones cross the opening or closing of a contact at another step. most: of the
-    uncertainty, over the largest derivative. unconverged: what Newton's method leaves of a quantity, over it.
+    sizes: of steps over the parameter; of each quantity the median of the three differences that are known best
+    counts, with the largest uncertainty of these. Small steps suffer from rounding, where one uncertainty may be small
+    by chance, and large ones cross the opening or closing of a contact at another step. most: of the uncertainty, over
+    the largest derivative. unconverged: what Newton's method leaves of a quantity, over it.
     """
     frozen = FrozenSteps(scene)
     for parameter in parameters_of(frozen.scene, UNILATERAL):
@@ -337,10 +338,15 @@ def check_beside_noise(
             for name in names:
                 difference, noise = derivative([run[name] for run in runs], step)
                 found[name].append((noise.max(), difference))
-        best = {name: min(differences, key=lambda each: each[0]) for name, differences in found.items()}
+        best: dict[str, tuple[float, Array]] = {}
+        for name, differences in found.items():
+            noises, known = zip(*sorted(differences, key=lambda each: each[0])[:3], strict=True)
+            best[name] = (max(noises), np.median(known, axis=0))
         for name, (noise, difference) in best.items():
-            largest = max(np.abs(best[other][1]).max() for other in TOGETHER.get(name, (name,)))
-            error, left = np.abs(slope[name] - difference).max(), unconverged * np.abs(values[name]).max()
+            together = TOGETHER.get(name, (name,))
+            largest = max(np.abs(best[other][1]).max() for other in together)
+            error = np.abs(slope[name] - difference).max()
+            left = unconverged * max(np.abs(values[other]).max() for other in together)
             about = (parameter.path, name, error, noise, largest)
             assert noise <= most * largest + left / abs(parameter.value), about
             # Both the uncertainty and the error are a few rounding errors of runs over the step.
@@ -357,7 +363,8 @@ def test_differences_with_the_same_steps_of_unilateral_contacts(effects: dict[st
     scene = lifting(0.1, 0.12, **effects)
     assert not simulate(scene).events
     names = (*CHECKED, "separation")
-    check_beside_noise(scene, (1e-2, 1e-3, 1e-4, 1e-5), names, 1e-4, 3e-7 if "spin" in effects else 1e-9)
+    sizes = (1e-2, 7e-3, 5e-3, 1e-3, 7e-4, 5e-4, 1e-4, 7e-5, 5e-5, 1e-5)
+    check_beside_noise(scene, sizes, names, 1e-4, 3e-7 if "spin" in effects else 1e-9)
 
 
 @pytest.mark.slow
@@ -365,7 +372,8 @@ def test_differences_with_the_same_steps_through_lift_off_and_landing() -> None:
     scene = lifting(0.2, 0.112)
     assert [event.kind for event in simulate(scene).events] == ["lift_off", "landing"]
     names = ("tilt_angles", "tilt_rates", "friction_state", "normal_force", "top_force", "separation")
-    check_beside_noise(scene, (1e-5, 1e-6, 1e-7, 1e-8), names, 1e-3)
+    sizes = (1.4e-5, 1e-5, 7e-6, 1e-6, 3e-7, 1e-7, 1.4e-8, 1e-8, 7e-9)
+    check_beside_noise(scene, sizes, names, 1e-3)
 
 
 @pytest.mark.slow
