@@ -134,11 +134,9 @@ def _has_rims(bearing: Bearing) -> bool:
 
 
 def _rig(rest: float, axial_load: float, bearing: Bearing) -> RigTop:
-    """The rig that holds the upper plate; a plate that is one piece with the only slider tilts with it, and is free to.
-
-    rest: axial force at rest [N].
-    """
+    """The rig that holds the upper plate under an axial force at rest [N]."""
     stiffness = HOLD * rest
+    # A plate that is one piece with the only slider tilts as it slides.
     against_tilt = 0.0 if bearing.layout.surfaces == 1 else stiffness
     return RigTop(axial_load, stiffness, RELAXED * stiffness, against_tilt, RELAXED * against_tilt)
 
