@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from msfp_gen.auditing.case import INCONSISTENT, OPEN, Answer, stated_mass
+from msfp_gen.auditing.case import BOUND_FLOOR, INCONSISTENT, OPEN, Answer, si, stated_mass
 from msfp_gen.auditing.histories import Histories
 from msfp_gen.auditing.momentum import momentum
 from msfp_gen.auditing.sliding import CLOSED, ERRORS, Sliding
@@ -14,6 +16,7 @@ from msfp_gen.common.fields import G
 
 AGAINST = 0.1  # work against the motion over the sum of its parts, from which on a sign is wrong
 FAR = 1.5  # ratio from which on a unit is suspected
+BEYOND = 5.0  # displacement over that of the last rim, which is no travel but another unit
 CLOSE = 0.1  # difference of radius and friction with the right unit
 LENGTHS = {1e3: "millimetres", 1e2: "centimetres", 39.3701: "inches", 3.28084: "feet", 1e-3: "kilometres"}
 FORCES = {
@@ -30,10 +33,18 @@ FORCES = {
 def corrected(data: Histories, stated: Stated) -> tuple[Histories, dict[str, Answer]]:
     """Histories with signs and units put right, and what was found."""
     found: dict[str, Answer] = {}
+    no_weight = ""
+    if data.weightless:
+        no_weight = (
+            f"the axial force at rest is {si(data.at_rest, 'N')}, so that the bearing carries nothing: the column is "
+            "empty, or has the variation about the weight alone; it is left out of what follows"
+        )
+        data = replace(data, columns={name: values for name, values in data.columns.items() if name != "axial"})
     factors, texts, unsure = _signs(data)
     data = data.scaled(factors)
-    if texts:
-        found["signs"] = Answer(INCONSISTENT, "; ".join(texts) + "; it is turned in what follows")
+    if texts or no_weight:
+        turned = ["; ".join(texts) + "; it is turned in what follows"] if texts else []
+        found["signs"] = Answer(INCONSISTENT, "; ".join(filter(None, [no_weight, *turned])))
     elif unsure:
         text = f"{unsure} gives work in all, as the dish of a mass that bounces may do; rows without lift-off decide"
         found["signs"] = Answer(OPEN, text)
@@ -101,7 +112,8 @@ def _units(data: Histories, stated: Stated) -> tuple[dict[str, float], Answer | 
     """Factors of columns in another unit, and what was found; None where all units fit."""
     whole = not data.missing("displacement", "force", "axial") and data.at_rest > 0
     ratio = _ratio(data, stated) if whole else 1.0
-    found = (_other_unit(data, stated) if ratio > FAR else None) or _other_acceleration(data, stated)
+    found = _other_unit(data, stated) or _other_length(data, stated) if ratio > FAR else None
+    found = found or _other_acceleration(data, stated)
     if found is not None:
         factors, text, value = found
         return factors, Answer(INCONSISTENT, f"{text}; it is put right in what follows", value)
@@ -145,6 +157,27 @@ def _other_unit(data: Histories, stated: Stated) -> tuple[dict[str, float], str,
                 text = f"the {what} is {factor:g} times what the bearing has: it looks like {unit} with another unit"
                 best = (off, dict.fromkeys(names, 1.0 / factor), f"{text} named", factor)
     return None if best is None else best[1:]
+
+
+def _other_length(data: Histories, stated: Stated) -> tuple[dict[str, float], str, float] | None:
+    """The one unit in which a displacement far beyond the rims, of a motion that slides little, fits; None: not one."""
+    most = float(np.hypot(*data.displacement.T).max())
+    if most < BEYOND * stated.capacity:
+        return None
+    names = [name for name in data.columns if name.startswith("displacement")]
+    fitting = [
+        (dict.fromkeys(names, 1.0 / factor), factor, unit)
+        for factor, unit in LENGTHS.items()
+        if factor > 1.0 and _ratio(data.scaled(dict.fromkeys(names, 1.0 / factor)), stated) <= 1.0 + BOUND_FLOOR
+    ]
+    if len(fitting) != 1:
+        return None
+    [(factors, factor, unit)] = fitting
+    text = (
+        f"the displacement of {most:.4g} m is beyond the last rim, at {1e3 * stated.capacity:.4g} mm: it looks like "
+        f"{unit} with another unit named"
+    )
+    return factors, text, factor
 
 
 def _fits(data: Histories, stated: Stated) -> float | None:

@@ -18,6 +18,7 @@ from msfp_gen.common.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load
 from msfp_gen.results.result import Result
+from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import RigTop
 from msfp_gen.specification.layout import Auto
@@ -78,13 +79,13 @@ def shadow_scene(data: Histories, stated: Stated, step: int = 1) -> Scene:
     step: every so many rows are used.
     """
     rest, (lower, upper) = data.at_rest, ends(data)
-    top = _rig(rest, rest)
+    top = _rig(rest, rest, stated.bearing)
     axial = np.maximum(data.axial, LEAST_LOAD * rest)
     scene = Scene(
         stated.bearing,
         _motion(data, lower, step),
         top,
-        Auto() if stated.scene is None else stated.scene.effects,
+        Auto(rims=None if _has_rims(stated.bearing) else False) if stated.scene is None else stated.scene.effects,
         load=_load(data, top, axial, upper, step),
         output_step=data.step,
         name=f"shadow of {data.name}",
@@ -107,7 +108,7 @@ def opening_scene(data: Histories, scene: Scene, closed: Result) -> Scene:
     recorded = data.columns.get("rise", np.zeros_like(time))
     lower[:, 2] = -dish - np.where(open_, np.maximum(recorded - recorded[0] - dish, 0.0), 0.0)
     last = replace(bearing.bodies[-1], mass=rest / bearing.gravity)
-    top = _rig(rest, 0.0)
+    top = _rig(rest, 0.0, bearing)
     axial = np.where(open_, data.axial, np.maximum(data.axial, LEAST_LOAD * rest))
     changed = replace(
         scene,
@@ -125,10 +126,19 @@ def even_load(data: Histories, scene: Scene) -> Scene:
     return replace(scene, load=_load(data, scene.top, np.full_like(data.time, data.at_rest), ends(data)[1], 1))
 
 
-def _rig(rest: float, axial_load: float) -> RigTop:
-    """The rig that holds the upper plate. rest: axial force at rest [N]."""
+def _has_rims(bearing: Bearing) -> bool:
+    """Whether the data of the bearing have all that rims need."""
+    return all(
+        surface.rim_stiffness and bearing.slider_rim_radius(index) for index, surface in enumerate(bearing.surfaces)
+    )
+
+
+def _rig(rest: float, axial_load: float, bearing: Bearing) -> RigTop:
+    """The rig that holds the upper plate under an axial force at rest [N]."""
     stiffness = HOLD * rest
-    return RigTop(axial_load, stiffness, RELAXED * stiffness, stiffness, RELAXED * stiffness)
+    # A plate that is one piece with the only slider tilts as it slides.
+    against_tilt = 0.0 if bearing.layout.surfaces == 1 else stiffness
+    return RigTop(axial_load, stiffness, RELAXED * stiffness, against_tilt, RELAXED * against_tilt)
 
 
 def _motion(data: Histories, lower: Array, step: int) -> Motion:

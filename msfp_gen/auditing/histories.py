@@ -33,6 +33,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
     **{f"temperature_{i}": ("degC", "temperature of surface i at its centre") for i in range(1, 10)},
 }  # fmt: skip
 LEAST_ROWS = 20
+NO_WEIGHT = 0.05  # axial force at rest over its RMS, below which the column does not have the weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +123,13 @@ class Histories:
     def before(self) -> float:
         """Axial force before the first motion, the median of these rows [N]."""
         return float(np.median(self.axial[: self.moved_at() + 1]))
+
+    @property
+    def weightless(self) -> bool:
+        """Whether an axial force is given that is nearly zero at rest, as a variation about the weight is."""
+        if "axial" not in self.columns:
+            return False
+        return abs(self.at_rest) <= NO_WEIGHT * float(np.sqrt(np.mean(self.axial**2)))
 
     def below(self, share: float) -> Flags:
         """Rows after the first motion with an axial force below a share of its value at rest, ndarray, shape (T,)."""

@@ -131,7 +131,7 @@ def tension(case: AuditCase) -> Answer:
         return lack
     data = case.data
     row = int(data.axial.argmin())
-    least = float(data.axial[row])
+    least = float(data.axial[row]) + 0.0  # of a turned column, -0.0 is 0.0
     drawing = course("axial force", data.time, data.axial / 1e3, "axial force, compression positive [kN]", row)
     if least >= -NO_TENSION * data.at_rest:
         text = f"the least axial force is a compression of {si(abs(max(least, 0.0)), 'N')}"

@@ -270,6 +270,10 @@ def shadow(source: Any, bearing: Any, columns: str | Path | Mapping[str, Any] | 
     if missing := given.missing("displacement", "force", "axial"):
         raise InputError(f"{given.name}: no column {missing[0]}; a shadow needs displacement, force and axial")
     data, found = corrected(given, stated)
+    if "axial" not in data.columns:
+        raise InputError(f"{given.name}: {found['signs'].sentence.split(': ')[0]}; a shadow needs the load at rest")
+    if not data.force.any():
+        raise InputError(f"{given.name}: the force is zero in every row; a shadow compares it with the model's")
     if start := off_centre(data):
         raise InputError(
             f"{given.name}: the first displacement is {1e3 * start:.4g} mm; cut the record to begin at the centre"

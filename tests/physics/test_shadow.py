@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from external import MAT
 from support.audits import run_of, shaken, tensile, uncoupled, with_columns, with_force
 
 from msfp_gen import InputError, load_scene, shadow, simulate
@@ -131,3 +132,15 @@ def test_an_element_that_does_not_heat_is_named():
     assert found.difference > 0.1 and found.left_out[0].after < 0.005
     heat = {one.surface: one for one in found.differences if one.quantity == "temperature"}
     assert set(heat) == {1, 2} and heat[1].unit == "K"
+
+
+def test_a_plate_in_one_piece_with_the_only_slider_tilts():
+    scene = load_scene("single-push")
+    data = histories_of(simulate(scene))
+    for given in (data, across(data)):
+        assert shadow(given, scene).difference < 2e-3
+
+
+def test_a_bearing_without_rims_has_a_shadow_without_them():
+    found = shadow(MAT / "case1.csv", MAT / "bearing.toml", MAT / "map.toml")
+    assert found.difference < 0.01 and found.missing == () and not found.result.effects.rims

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.audits import WEIGHT, rows_of, shaken, with_columns, with_force
+from support.audits import WEIGHT, rows_of, run_of, shaken, with_columns, with_force
 
-from msfp_gen import InputError, audit
+from msfp_gen import InputError, audit, shadow
 from msfp_gen.auditing import Histories
 from msfp_gen.auditing.case import CONSISTENT, INCONSISTENT, OPEN, AuditCase
 from msfp_gen.auditing.checks import CHECKS
@@ -213,3 +213,29 @@ def test_every_check_of_a_few_rows_answers():
     data, found = corrected(rows_of(pendulum(), 40), STATED)
     case = AuditCase(data, STATED, data, found)
     assert all(check(case).sentence for _, check in CHECKS.values())
+
+
+@pytest.mark.parametrize("axial", [0.0 * TIME, 0.3 * WEIGHT * np.sin(11.0 * TIME)])
+def test_an_axial_force_without_the_weight_is_named(axial):
+    """An empty column, or the variation about the weight; with an acceleration, inertia has no weight to compare."""
+    data = with_columns(pendulum(), axial=axial, acceleration_1=-pendulum().force[:, 0] / MASS)
+    found = audit(data, SCENE)
+    assert [one.check for one in found.inconsistent] == ["signs"]
+    assert "the bearing carries nothing" in found.finding("signs").sentence
+    assert found.finding("friction_bound").verdict == found.finding("mass").verdict == OPEN
+    with pytest.raises(InputError, match="carries nothing; a shadow needs the load at rest"):
+        shadow(data, SCENE)
+
+
+def test_a_record_of_nothing_has_no_shadow():
+    with pytest.raises(InputError, match="the force is zero in every row"):
+        shadow(pendulum(u=0.0 * TIME), SCENE)
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "millimetres"), (39.3701, "inches")])
+def test_a_displacement_far_beyond_the_rims_has_another_unit(factor, unit):
+    """Of a quintuple pendulum whose outermost surfaces do not slide: radius and friction do not tell the unit."""
+    choices = {"bearing": "quintuple-fp", "scale": 0.8}
+    found = audit(run_of(**choices).scaled({"displacement_1": factor, "displacement_2": factor}), shaken(**choices))
+    assert [one.check for one in found.inconsistent] == ["units"]
+    assert unit in found.finding("units").sentence and found.finding("units").value == factor
