@@ -201,7 +201,9 @@ def against_depth() -> None:
     small, large = (deep(Layout(*counts)) for counts in ((5, 2, 2), (11, 5, 5)))
     states = [(scene, state_of(scene)) for scene in (small, large)]
     few, many = np.min([[timed(*each)[2] for each in states] for _ in range(ROUNDS)], axis=0)  # in turn
-    row("one Newton iteration, (11,5,5): (5,2,2)", f"{many:.0f} ns", f"{few:.0f} ns", f"{many / few:.1f} times the time")
+    row(
+        "one Newton iteration, (11,5,5): (5,2,2)", f"{many:.0f} ns", f"{few:.0f} ns", f"{many / few:.1f} times the time"
+    )
     few, many = np.min(
         [[build_seconds(scene.bearing.layout) for scene in (small, large)] for _ in range(pick(3, 1))], axis=0
     )

@@ -111,7 +111,7 @@ class _Layout:
 
 
 def _schedules(spec: ModelSpec) -> dict[str, tuple[Pass, ...]]:
-    """Both forms as passes without what C of the runtime solves: friction is given, as its state h and its force g."""
+    """Passes of both forms. Friction, which the runtime solves for, is given here by its state h and its force g."""
 
     def alone(passes: Iterable[Pass]) -> Iterator[Pass]:
         for one in passes:
@@ -144,7 +144,7 @@ def _programs(equations: Equations, called: set[str]) -> list[Program]:
 def equations_alone(spec: ModelSpec, example: Any) -> Generated:
     """The files of the equations alone. example: values of a bearing for the README.
 
-    There is no vertical spring of the top. Without uplift, a rotating top and friction laws.
+    The top has no vertical spring. Models with uplift, a rotating top or a friction law need the runtime.
     """
     begin = perf_counter()
     effects = spec.effects

@@ -117,7 +117,7 @@ def with_variables(effects: Effects) -> Schedule:
 
 
 def directional_kernels(equations: Equations) -> tuple[Kernel, ...]:
-    """Derivatives by parameters of the programs of the condensed equations, of the energies, and of those beside."""
+    """Derivatives by parameters: of the condensed equations, the energies, and the programs that C calls one by one."""
     effects = equations.spec.effects
     contacts = (lower(by_inputs(program)) for program in equations.programs if program.name == "contact")
     return (
@@ -180,8 +180,10 @@ def schedule_context(
     balances, with_directions = momentum_balances(effects), {**condensed(effects), **energies(effects)}
     port = two_port(effects) if effects.permits_moving_ends else {}
     of_ends, of_variables = {**condensed(effects), **port}, with_variables(effects)
-    for schedule in (balances, with_directions):
-        check(passes_of(schedule), programs, equations.blocks)
+    # The parts that C calls itself read what evaluations leave: their schedules are checked after these.
+    after = {**with_directions, **port, **beside(effects)}
+    for schedule in (balances, of_ends, after):
+        check(passes_of(schedule), programs, equations.blocks, equations.value_blocks)
     directed = _lists(with_directions)
     used = {name: None for name in LISTS if name in directed or name in _lists(balances) or name in _lists(port)}
     tangents = form_of(BY_VARIABLES, of_variables, by_variables)

@@ -243,7 +243,7 @@ def with_all_inputs(program: Program) -> list[Use]:
 
 
 def by_inputs(program: Program) -> Program:
-    """The program of a contact with all inputs active that it uses, for its Jacobian at all surfaces at once."""
+    """The program of a contact, active in every input that it uses, for its Jacobian at all surfaces at once."""
     symbols = {s.name for statement in program.statements for s in statement.expression.free_symbols}
 
     def used(use: Use) -> Use:

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from .blocks import Blocks
 from .program import Block, Program
 
 
@@ -61,9 +60,9 @@ class Solve:
     """A program that the runtime evaluates and differentiates itself, because it solves for what the program needs.
 
     Attributes:
-        forms: the forms of derivatives (`drivers.py`) that there are: "tangents", "directions", "by_ends".
+        forms: the forms of derivatives (`drivers.py`) that exist: "tangents", "directions", "by_ends".
         emitted: the forms of which the derivatives are a program, which is emitted.
-        gives_results: whether it gives the results where it asks for the derivatives.
+        gives_results: whether the runtime gives the results too where the derivatives are asked for.
         fails: whether it may find no solution, with a status at which the evaluation ends.
     """
 
@@ -219,7 +218,16 @@ LISTS: Mapping[str, List] = {
     "gap": List("gap", "gap", per=Per.SURFACE),
     "resting_foot": List("resting_foot", "resting_foot"),
     "friction_end": List("friction_end", "friction_end", per=Per.SURFACE),
+    "slip": List("slip", "slip", per=Per.SURFACE, is_input=True),
+    "slip_end": List("slip_end", "slip_end", per=Per.SURFACE, is_input=True),
     "slip_work": List("slip_work", "slip_work", per=Per.SURFACE),
+    "foot_previous": List("foot_previous", "foot_previous", is_input=True),
+    "body_values": List("body_values", "body_values", ListStorage.PARAMETERS, Per.BODY, is_input=True),
+    "surface_values": List("surface_values", "surface_values", ListStorage.PARAMETERS, Per.SURFACE, is_input=True),
+    "top_values": List("top_values", "top_values", ListStorage.PARAMETERS, is_input=True),
+    "sides": List("sides", "sides", ListStorage.PARAMETERS, Per.BODY, is_input=True),
+    "side": List("side", "side", ListStorage.PARAMETERS, Per.SURFACE, is_input=True),
+    "around": List("around", "around", ListStorage.PARAMETERS, is_input=True),
 }
 """All lists of blocks."""
 
@@ -293,22 +301,26 @@ def unrolled(passes: Iterable[Pass], signs: Sequence[int]) -> Iterator[tuple[Cal
                 yield call, reads, writes
 
 
-def check(passes: Iterable[Pass], programs: Mapping[str, Program], blocks: Blocks) -> None:
-    """Raise AssertionError where a place does not fit its program, or nothing has written what a program reads."""
+def check(passes: Iterable[Pass], programs: Mapping[str, Program], *records: object) -> None:
+    """Raise AssertionError where a place does not fit its program, or nothing has written what a program reads.
+
+    records: those whose fields are the blocks of the places, `Blocks` and `ValueBlocks`.
+    """
     known = {name for name, one in LISTS.items() if one.is_input}
     every = ((call, programs[name]) for call in calls_of(passes) for name in call.programs)
     for call, program in every:
         assert program.output is not None
         assert len(call.reads) == len(program.inputs), call
         for place, use in zip(call.reads, program.inputs, strict=True):
-            assert block_of(place, blocks) == use.block, (call, place)
+            assert block_of(place, *records) == use.block, (call, place)
             assert list_name(place) in known, (call, place)
-        fields = [field for place in call.writes for field in block_of(place, blocks).fields]
+        fields = [field for place in call.writes for field in block_of(place, *records).fields]
         assert len(fields) == len(program.output.block.fields), call
         known |= {list_name(place) for place in call.writes}
 
 
-def block_of(place: str, blocks: Blocks) -> Block:
-    """The block of a place."""
-    block: Block = getattr(blocks, list_of(place).kind)
+def block_of(place: str, *records: object) -> Block:
+    """The block of a place, in the first of the records that has it."""
+    kind = list_of(place).kind
+    block: Block = next(vars(one)[kind] for one in records if kind in vars(one))
     return block

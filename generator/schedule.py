@@ -91,8 +91,8 @@ STAGE = Call("contact_stage", ("surface_parameters[j]", "friction_previous[j]"),
 def momentum_balances(effects: Effects) -> Schedule:
     """The momentum balances (3.26)-(3.29) at given unknowns (2.119), as PEER 2017/07 states them.
 
-    With uplift the unilateral contacts give the forces of the surfaces. That the force (3.15)-(3.17) of a contact, at
-    given psi~, theta~ and N, is the same are further rows.
+    With uplift the unilateral contacts give the forces of the surfaces. Further rows state that the force (3.15)-(3.17)
+    of a contact, at given psi~, theta~ and N, is the same.
     """
     memory, uplift = remembers(effects), effects.uplift
     remembered = ("friction_stage[j]",) if memory else ()
@@ -336,7 +336,7 @@ def two_port(effects: Effects) -> Schedule:
 
 
 def beside(effects: Effects) -> Schedule:
-    """What the runtime calls itself, before, between and after evaluations, and differentiates by parameters."""
+    """Programs that C calls one by one, before, between and after evaluations, with their derivatives by parameters."""
     by = Solve(frozenset({"directions"}), frozenset({"directions"}))
     load = Call("load_work", ("load_end", "load_end"), ("load_work",), by)
     slip = (

@@ -28,7 +28,7 @@ from .program import ZERO, Program, Statement, Symbols, add, cross, derivative, 
 
 
 def _angles(p: Program, t: Symbols) -> dict[str, sp.Expr]:
-    """psi, theta, phi (2.1) of the rotation vector, with the rates of their statements declared."""
+    """psi, theta, phi (2.1) of the rotation vector; declares the rates of its statements."""
     p.declare_rates(t["r"], t["r1"])
     p.declare_rates(t["r1"], t["r2"])
     x, y, z = t["r"]

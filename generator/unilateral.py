@@ -138,7 +138,7 @@ def surface_force(b: Blocks, rims: bool) -> Program:
 def split_moment(b: Blocks, rims: bool) -> Program:
     """Moments of a surface on the bodies above and below, each about the sphere centre of its body.
 
-    They are equal but on the slider, where the moments of contact and rim by the separation are added.
+    The one on the slider also has the moments of contact and rim by the separation.
     """
     p = Program("split_moment", "moments of a surface on the bodies above and below, each about its sphere centre")
     par: Symbols = p.read(b.surface_parameters, "par")

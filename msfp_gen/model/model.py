@@ -98,8 +98,11 @@ class Ode:
 
     def _accelerations(self, t: float, y: Array) -> tuple[Array, Array, Array, int]:
         """Accelerations, the row of this state, friction rates and Newton iterations. Raises RunError on failure."""
-        q, v, h = self._split(np.asarray(y))
-        status, a, row, rates, _, iterations, *_ = self.stack.accelerations(q, v, h, self._base(t), self.load)
+        given = (*self._split(np.asarray(y)), self._base(t), self.load)
+        found = self.stack.accelerations(*given)
+        if found[0] == "newton":  # trial states of a method, far from the motion: the balances converge there too
+            found = self.stack.accelerations(*given, report=True)
+        status, a, row, rates, _, iterations, *_ = found
         if status != "ok":
             raise RunError(f"as_ode: {status} at t = {t:.6g} s", status=status)
         return a, row, rates, iterations
@@ -277,7 +280,7 @@ class Model:
         status, a, rows, rates = self.stack(bearing, top).many_accelerations(*arrays.values())
         if (failed := np.flatnonzero(status != self.extension.OK)).size:
             raise RunError(
-                f"accelerations: state {failed[0]} has none; evaluate it alone for the reason", status="failed"
+                f"accelerations: none was found for state {failed[0]}; is it possible, and its load?", status="failed"
             )
         return {"acceleration": a, "friction_rate": rates, **self.unpack(rows)}
 

@@ -116,12 +116,26 @@ double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const do
     return size;
 }
 
+/* Whether a step of the unknowns is below the roundoff of the accelerations. While surfaces are open N, the scale of
+ * the residual, is so small that its roundoff is no measure. */
+static int below_roundoff(const msfp_point *at, const double *step)
+{
+    double size[2] = { 0.0 }, moved[2] = { 0.0 }; /* of angles, of separations */
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i) {
+            const int separation = unknown[i] >= 3;
+            size[separation] = fmax(size[separation], fabs(at->a[k][unknown[i]]));
+            moved[separation] = fmax(moved[separation], fabs(step[k * ND + i]));
+        }
+    return moved[0] <= 1e-12 * size[0] && moved[1] <= 1e-12 * size[1];
+}
+
 /* The equations are nearly linear in the accelerations: the first factors are kept while a step reduces the residual a
  * hundredfold. */
 int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, msfp_solution *out)
 {
     double residual[DOF], tangent[DOF * DOF], g[NB][2], last = INFINITY;
-    int pivots[DOF], worst;
+    int pivots[DOF], worst, settled = 0;
     msfp_stage_weights weights = { .a_weight = 1.0 };
     memcpy(weights.fp, at->f, sizeof weights.fp);
     memcpy(g, at->f, sizeof g);
@@ -136,7 +150,8 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
         if (!(out->residual < INFINITY))
             return MSFP_E_FINITE;
         /* Converged, or at the floor that rounding leaves; a step is taken all the same, for the determinant. */
-        if ((out->iterations && out->residual <= 1e-13) || (out->residual <= 1e-9 && out->residual >= 0.5 * last))
+        if ((out->iterations && out->residual <= 1e-13) ||
+            ((settled || out->residual <= 1e-9) && out->residual >= 0.5 * last))
             return MSFP_OK;
         const int good = out->residual < 1e-2 * last;
         last = out->residual;
@@ -151,6 +166,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
         for (int k = 0; k < NB; ++k)
             for (int i = 0; i < ND; ++i)
                 at->a[k][unknown[i]] -= residual[k * ND + i];
+        settled = below_roundoff(at, residual);
     }
     return MSFP_E_NEWTON;
 }

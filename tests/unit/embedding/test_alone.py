@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib.util
 import re
 import subprocess
@@ -187,14 +186,12 @@ def test_folder_is_small_and_its_example_runs_with_numpy_alone(built):
     assert wrapper.count("\n") <= 200
     assert "warning" not in (folder / "build.log").read_text(encoding="utf-8")
     code = re.search(r"^```python\n(.*?)^```", (folder / "README.md").read_text(encoding="utf-8"), re.M | re.S)[1]
-    ast.parse(code)
-    if spec.effects.sliders == "massless":
-        return
     loaded = "import sys; print('msfp_gen' in sys.modules, 'sympy' in sys.modules)"
     run = subprocess.run(
         [sys.executable, "-c", f"{code}\n{loaded}"], cwd=folder, capture_output=True, text=True, check=True
     )
-    assert float(re.search(r"residual \[N m\]: (\S+)", run.stdout)[1]) < 1e-6
+    residual = float(re.search(r"residual \[N m\]: (\S+)", run.stdout)[1])
+    assert np.isfinite(residual) and (residual < 1e-6 or spec.effects.sliders == "massless")
     assert run.stdout.splitlines()[-1] == "False False"
 
 

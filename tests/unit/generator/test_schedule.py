@@ -11,13 +11,14 @@ from pathlib import Path
 import pytest
 
 from msfp_gen import Effects, Layout
-from msfp_gen.generator import directions, drivers, places
+from msfp_gen.generator import directions, drivers, generate, places
 from msfp_gen.generator import schedule as schedules
 from msfp_gen.generator.derive import Equations, derive
+from msfp_gen.generator.drivers import with_ends
 from msfp_gen.generator.lower import lower
 from msfp_gen.generator.places import Call, Pass, Schedule, calls_of, check, passes_of
 from msfp_gen.generator.program import Program
-from msfp_gen.generator.schedule import condensed, momentum_balances, unknowns
+from msfp_gen.generator.schedule import beside, condensed, energies, momentum_balances, two_port, unknowns
 from msfp_gen.specification.layout import ModelSpec
 
 EFFECTS = [
@@ -37,8 +38,15 @@ def equations_of(**effects: object) -> Equations:
 SCHEDULES = [momentum_balances, condensed]
 
 
+def all_parts(effects: Effects) -> Schedule:
+    """An evaluation, what follows it, and the programs that C calls one by one."""
+    ends = with_ends(effects) if effects.permits_moving_ends else {}
+    return {**condensed(effects), **ends, **energies(effects), **beside(effects)}
+
+
 def checked(equations: Equations, passes: tuple[Pass, ...]) -> None:
-    check(passes, {program.name: program for program in equations.programs}, equations.blocks)
+    programs = {program.name: program for program in equations.programs}
+    check(passes, programs, equations.blocks, equations.value_blocks)
 
 
 def changed(name: str, change: Callable[[Call], Call | None]) -> tuple[Pass, ...]:
@@ -51,7 +59,7 @@ def changed(name: str, change: Callable[[Call], Call | None]) -> tuple[Pass, ...
     return tuple(replace(one, calls=calls(one)) for one in passes_of(momentum_balances(Effects())))
 
 
-@pytest.mark.parametrize("schedule", SCHEDULES)
+@pytest.mark.parametrize("schedule", [*SCHEDULES, all_parts])
 @pytest.mark.parametrize("effects", EFFECTS, ids=str)
 def test_schedule_fits_the_programs_of_every_model(
     effects: dict[str, object], schedule: Callable[[Effects], Schedule]
@@ -64,6 +72,18 @@ def test_a_place_of_another_kind_is_found() -> None:
     swapped = changed("linear_balance", lambda call: replace(call, reads=(*call.reads[:2], "moment[k-1]", "force[k]")))
     with pytest.raises(AssertionError, match="linear_balance"):
         checked(equations_of(), swapped)
+
+
+def test_generation_checks_the_ends_of_a_two_port(monkeypatch: pytest.MonkeyPatch) -> None:
+    def swapped(effects: Effects) -> Schedule:
+        def turned(one: Pass) -> Pass:
+            return replace(one, calls=tuple(replace(call, reads=call.reads[::-1]) for call in one.calls))
+
+        return {name: tuple(map(turned, passes)) for name, passes in two_port(effects).items()}
+
+    monkeypatch.setattr(drivers, "two_port", swapped)
+    with pytest.raises(AssertionError, match=r"interface_load|lower_wrench|upper_wrench|locking_moment"):
+        generate(ModelSpec(Layout(2, 0, 1), Effects(top_rotation=True)))
 
 
 def test_a_missing_input_is_found() -> None:

@@ -10,12 +10,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from support import Array, differences, model_of, thinned
 
-from msfp_gen import Effects, InputError, Motion, RunError, Scene, Solver, Top, presets, simulate
+from msfp_gen import Effects, InputError, Motion, RunError, Scene, Solver, Top, build_model, presets, simulate
 
 TFP = (5, 2, 2)
 RIG = Top.rig(112e3, 1e8, 5.0, 1e6, 5.0)
 MASS = Top.mass(112e3 / 9.8, 300.0, 0.5, 1e7, 1e4)
 CALM = 0.1
+SLOW = pytest.mark.slow
 EFFECTS: list[dict[str, Any]] = [
     {},
     {"spin": "patch"},
@@ -95,3 +96,38 @@ def test_a_state_that_is_no_number_is_an_error() -> None:
     for rates in (ode.fun, ode.jac):
         with pytest.raises(RunError):
             rates(0.0, np.full(32, np.nan))
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [("double-fp", "Radau"), ("prototype-tfp", "BDF"), pytest.param("fenz-tfp", "Radau", marks=SLOW)],
+)
+def test_through_lift_off_and_landing(name: str, method: str) -> None:
+    """A mass shaken sideways, and vertically by 1.1 g; trials far from the motion have no accelerations."""
+    time = np.linspace(0.0, 0.8, 321)
+    share = np.clip(time / 0.5, 0.0, 1.0)
+    growth = share**3 * (10 - 15 * share + 6 * share**2)
+    path = np.zeros((len(time), 3))
+    path[:, 0] = 0.03 * growth * np.sin(2 * np.pi * time)
+    path[:, 2] = 1.1 * 9.8 / (4 * np.pi) ** 2 * growth * np.sin(4 * np.pi * time)
+    top = Top.mass("11.4 t", inertia="300 kg m^2", height="0.5 m", rotational_stiffness=1e7, rotational_damping=1e4)
+    bearing, motion = presets.bearing(name), Motion.from_arrays(time, path)
+    effects = Effects(dimension="planar", uplift=True)
+    fun, jac, y0 = build_model(bearing.layout, effects).as_ode(bearing, motion, top)
+
+    def tried(t: float, y: Array) -> Array:
+        try:
+            return fun(t, y)
+        except RunError:
+            return np.full_like(y, np.nan)
+
+    rows = np.linspace(0.0, 0.75, 151)
+    found = solve_ivp(tried, (0, 0.75), y0, method, rows, jac=jac, rtol=1e-5, atol=1e-8, first_step=1e-4)
+    assert found.success and np.isfinite(found.y).all()
+    rise = found.y[: y0.size * 6 // 14].reshape(-1, 6, len(rows))[:, 5].sum(axis=0)
+    scene = Scene(bearing, motion, top, effects=effects, duration=0.75, output_step=0.005)
+    result = simulate(scene)
+    assert [event.kind for event in result.events][:1] == ["lift_off"]
+    want = result.history.separation[:, :, 2].sum(axis=1)
+    assert want.max() > 2e-3
+    assert rise == pytest.approx(want, abs=0.01 * want.max())
