@@ -370,10 +370,12 @@ def _outcome(bounds: SuiteBounds) -> str:
     runs = bounds.ended.size
     early = len(bounds.failures) + len(bounds.stopped)
     ended = f"{early} of {runs} runs did not reach their end" if early else f"All {runs} runs reached their end"
-    exceeded = len(bounds.exceeded)
-    limits = (
-        f"{exceeded} of {runs} exceeded limits of the device" if exceeded else "none exceeded a limit of the device"
-    )
+    exceeded, failed = len(bounds.exceeded), len(bounds.failures)
+    of = f"the {runs - failed} that did not fail" if failed else f"{runs}"  # the others may be beyond limits: the table
+    if exceeded:
+        limits = f"{exceeded} of {of} exceeded limits of the device"
+    else:
+        limits = f"none{f' of {of}' if failed else ''} exceeded a limit of the device"
     return f"{ended}; {limits}."
 
 

@@ -24,7 +24,8 @@ _COEFFICIENTS = Quantity("", least=0.0, shape=(None,))
 # Device -> (number of concave-up surfaces, of concave-down ones) of its layout.
 LAYOUTS = {"single": (1, 1), "double": (1, 1), "triple": (2, 2), "quintuple": (3, 3)}
 RIM_STIFFNESS, RIM_DAMPING = 1e8, 1e3  # of steel on steel [N/m], [N s/m], as in the presets for buildings
-JOINT_CAPACITY = 0.9  # of the joint below a single pendulum's plate, over its radius: more than the dish permits
+# Capacity of the joint below a single pendulum's plate, over its radius: a usual one, and more than its dish permits.
+JOINT_TILT, MOST_JOINT_TILT, OVER_DISH = 0.45, 0.9, 1.5
 BOUNDS = ("friction_lower", "friction_upper")
 
 
@@ -185,7 +186,8 @@ class Sheet:
         heights, at = list(self.height), "pivot"
         if self.device == "single":
             joint, ratio = 2 * inner, self.effective_radius[0] / radii[0]
-            radii, capacities = [*radii, joint], [*capacities, JOINT_CAPACITY * joint]
+            tilt = min(MOST_JOINT_TILT, max(JOINT_TILT, OVER_DISH * capacities[0] / radii[0]))
+            radii, capacities = [*radii, joint], [*capacities, tilt * joint]
             heights, at = [heights[0], joint], "surface"  # the pivot is the centre of the joint
             frictions = {name: (values[0] * ratio, 0.0) for name, values in frictions.items()}
         nominal = frictions.pop("friction")

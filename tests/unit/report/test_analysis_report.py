@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from html import escape
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from msfp_gen.common.tables import decimal_text
 from msfp_gen.report import TitleBlock, analysis_html, write_analysis
 from msfp_gen.report.analysis import (
     _last_sections,
+    _outcome,
     _sections,
     doubt_table,
     limit_table,
@@ -355,3 +357,19 @@ def test_what_was_compared_is_what_tests_compare() -> None:
             assert path.name in page or path.name == f"test_{one.page}_page.py", f"{test} is not on the page {one.page}"
     parts = [row[0] for row in compared_table(set()).rows]
     assert "superstructure on its bearings" not in parts and len(parts) < len(COMPARISONS)
+
+
+def test_runs_that_ended_early_are_not_among_those_within_the_limits() -> None:
+    """What a run that failed had reached until then may be beyond a limit; the table of shares has it."""
+    run = ("CCC", "lower")
+
+    def outcome(failures: Any, exceeded: Any) -> str:
+        return _outcome(SimpleNamespace(ended=np.ones(6), failures=failures, stopped={}, exceeded=exceeded))  # type: ignore[arg-type]
+
+    assert outcome({}, {}) == "All 6 runs reached their end; none exceeded a limit of the device."
+    assert outcome({run: ""}, {}) == (
+        "1 of 6 runs did not reach their end; none of the 5 that did not fail exceeded a limit of the device."
+    )
+    assert outcome({run: ""}, {("CLC", "lower"): ""}).endswith(
+        "; 1 of the 5 that did not fail exceeded limits of the device."
+    )

@@ -13,6 +13,7 @@ import pytest
 from support import ROOT
 
 from msfp_gen import (
+    Bearing,
     InputError,
     Measurement,
     Motion,
@@ -274,6 +275,18 @@ def test_no_published_design_is_blamed() -> None:
         assert not doubts_of(scene) and not refusals(scene), name
     for name in presets.names("bearing"):
         assert not list(doubtful_values(presets.bearing(name))), name
+
+
+@pytest.mark.parametrize("dish", [0.6, 1.2, 1.6])
+def test_the_joint_of_a_single_pendulum_is_not_blamed(dish: float) -> None:
+    """No sheet states it: its capacity is a usual one, and more than its dish permits."""
+    bearing = Bearing.from_sheet(
+        device="single", radius=[2.2], height=[0.08], friction=[0.06], slider_diameter=[0.3], dish_diameter=[dish],
+        axial_load=2e6,
+    )  # fmt: skip
+    assert not list(doubtful_values(bearing, 2e6))
+    tilts = [surface.capacity / surface.radius for surface in bearing.surfaces]
+    assert tilts[1] >= 1.2 * tilts[0]
 
 
 def test_the_times_of_a_record_are_in_seconds(tmp_path: Any) -> None:
