@@ -163,13 +163,24 @@ def _floor_mass(scene: BuildingScene) -> Iterator[Reading]:
         yield Reading(0, floor.mass, floor.mass / mean, {"path": _path(index)})
 
 
+def _widest(scene: BuildingScene) -> float:
+    """Largest distance of two bearings [m]."""
+    return float(np.linalg.norm(scene.places[:, None] - scene.places, axis=-1).max())
+
+
 def _gyration(scene: BuildingScene) -> Iterator[Reading]:
     """Radii of gyration of the floors of a frame over the largest distance of two bearings."""
-    places = scene.places
-    widest = float(np.linalg.norm(places[:, None] - places, axis=-1).max())
+    widest = _widest(scene)
     for mass, floor in zip(_floor_mass(scene), floors(scene.building), strict=True):
         if mass.measure >= LIGHT and widest > 0:
             yield Reading(0, floor.gyration, floor.gyration / widest, {**mass.words, "widest": widest})
+
+
+def _plan(scene: BuildingScene) -> Iterator[Reading]:
+    """Largest distance of two bearings [m]."""
+    widest = _widest(scene)
+    if widest > 0:
+        yield Reading(0, widest, widest)
 
 
 def _heights(scene: BuildingScene) -> Iterator[Reading]:
@@ -229,10 +240,16 @@ OF_BUILDING = (
     ),
     UsualRange(
         _gyration,
-        (-np.inf, 1.0),
+        (0.02, 1.0),
         "{path}.inertia: about E3 the radius of gyration is {value:.3g} m, the bearings are at most {widest:.3g} m "
         "apart; is it mass times radius squared [kg m^2]?",
-        (-np.inf, 10.0),
+        (0.001, 10.0),
+    ),
+    UsualRange(
+        _plan,
+        (0.5, 500.0),
+        "building.bearing: two bearings are {value:.4g} m apart; are their positions in m?",
+        (0.01, 5000.0),
     ),
     UsualRange(
         _heights,

@@ -104,9 +104,20 @@ def _pressure(subject: Subject) -> Iterator[Reading]:
         yield Reading(0, subject.load, subject.load / (pi * min(radii) ** 2) * 1e-6, words)
 
 
+def _carried(subject: Subject) -> Iterator[Reading]:
+    """What a bearing carries at rest, over the weight of its own bodies above the base."""
+    own = subject.bearing.gravity * sum(body.mass for body in subject.bearing.bodies)
+    if subject.load > 0 and own > 0:
+        carried = subject.load - own
+        yield Reading(0, carried, carried / own, {"own": own})
+
+
 def _plates(subject: Subject) -> Iterator[Reading]:
-    """Heights of base and top plate over the radius of their surface."""
+    """Heights of the bodies over the radius of their surface, or the larger one of two."""
     bearing = subject.bearing
+    for index, body in enumerate(bearing.bodies[:-1]):
+        radius = max(surface.radius for surface in bearing.surfaces[index : index + 2])
+        yield Reading(0, body.height, body.height / radius, {"path": f"bodies[{index}].height"})
     for name, height, surface in (("base_height", bearing.base_height, 0), ("", bearing.bodies[-1].height, -1)):
         path = name or f"bodies[{len(bearing.bodies) - 1}].height"
         yield Reading(0, height, height / bearing.surfaces[surface].radius, {"path": path})
@@ -253,10 +264,17 @@ OF_BEARING = (
         (0.15, 5000.0),
     ),
     UsualRange(
+        _carried,
+        (2.0, inf),
+        "the bearing carries {value:.4g} N, {measure:.2g} of the weight of its own bodies, {own:.4g} N; are axial_load "
+        "or mass in N and kg?",
+        (1.0, inf),
+    ),
+    UsualRange(
         _plates,
         (-inf, 0.7),
-        "bearing.{path} = {value:g} m is {measure:.2g} of the radius of its surface; is it the height of the plate at "
-        "its axis, in metres?",
+        "bearing.{path} = {value:g} m is {measure:.2g} of the radius of its surface; is it the height at the axis, in "
+        "metres?",
         (-inf, 10.0),
     ),
     UsualRange(

@@ -178,7 +178,7 @@ class Sheet:
 
     @property
     def values(self) -> SheetValues:
-        """The fields of a bearing as plain values; friction is at the pivot, of a single pendulum at its surface."""
+        """The fields of a bearing as plain values; friction is at the pivot, of one or two surfaces at these."""
         assert self.radius and self.effective_radius and self.height and self.capacity
         m, p = LAYOUTS[self.device]
         radii, capacities, inner = list(self.radius), list(self.capacity), self.slider_diameter[0] / 2
@@ -190,6 +190,12 @@ class Sheet:
             radii, capacities = [*radii, joint], [*capacities, tilt * joint]
             heights, at = [heights[0], joint], "surface"  # the pivot is the centre of the joint
             frictions = {name: (values[0] * ratio, 0.0) for name, values in frictions.items()}
+        elif self.device == "double":  # its slider is one piece, whose middle need not be the pivot of the sheet
+            arms, at = [own / R for own, R in zip(self.effective_radius, radii, strict=True)], "surface"
+            frictions = {
+                name: tuple(mu * arm for mu, arm in zip(values, arms, strict=True))
+                for name, values in frictions.items()
+            }
         nominal = frictions.pop("friction")
         levels = [-h for h in heights[:m]] + heights[m:]
         thicknesses = [self.plate_height, *np.diff(levels).tolist(), self.plate_height]

@@ -92,6 +92,9 @@ MISTAKES: list[tuple[str, dict[str, Any], str, bool]] = [
     (TEST, {"bearing.gravity": 9810.0}, "bearing.gravity = 9810 m/s^2 is far from 9.81", True),
     (TEST, {"top.stiffness": 2e5}, "top.stiffness = 200000 N/m is 0.84 times the stiffness of the bearing", False),
     (TEST, {"top.stiffness": 1e5}, "top.stiffness = 100000 N/m is 0.42 times the stiffness of the bearing", True),
+    (TEST, {"bearing.bodies[1].mass": 20000.0}, "carries 1.12e+05 N, 0.57 of the weight of its own bodies", True),
+    (TEST, {"bearing.bodies[1].mass": 8000.0}, "carries 1.12e+05 N, 1.4 of the weight of its own bodies", False),
+    (TEST, {"bearing.bodies[1].height": 0.9}, "bearing.bodies[1].height = 0.9 m is 12 of the radius", True),
     (TEST, {"bearing.base_height": 0.4}, "bearing.base_height = 0.4 m is 0.85 of the radius", False),
     (TEST, {"bearing.bodies[3].height": 0.4}, "bearing.bodies[3].height = 0.4 m is 0.85 of the radius", False),
     (
@@ -132,6 +135,12 @@ MISTAKES: list[tuple[str, dict[str, Any], str, bool]] = [
         {"building.storey[1].inertia": [7.1e6, 16e6, 380e3 * 200.0**2]},
         "building.storey[1].inertia: about E3 the radius of gyration is 200 m, the bearings are at most 27",
         False,
+    ),
+    (
+        HOSPITAL,
+        {"building.base.inertia": [8.4, 19.0, 27.4]},
+        "building.base.inertia: about E3 the radius of gyration is 0.0078 m, the bearings are at most 27",
+        True,
     ),
     (HOSPITAL, {"building.storey[0].stiffness": [3.6e5, 3.0e5]}, "under 0.1 g the storey drifts", True),
     (

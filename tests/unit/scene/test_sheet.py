@@ -269,6 +269,17 @@ def test_dishes_that_would_meet_are_refused() -> None:
         Sheet(**sheet, dish_diameter=[edge + 1e-6])
 
 
+def test_pivot_of_a_double_is_where_its_heights_place_it() -> None:
+    """Not in the middle of its slider: Q = (mu_1 R_eff1 + mu_2 R_eff2)/(R_eff1 + R_eff2), by hand."""
+    bearing = Bearing.from_sheet(
+        device="double", radius=[1.5, 2.5], height=[0.02, 0.12], friction=[0.04, 0.08], slider_diameter=[0.4],
+        dish_diameter=[1.0, 1.0], axial_load=1.85e6,
+    )  # fmt: skip
+    height, length = characteristic(published_backbone(bearing))
+    assert length == pytest.approx(1.48 + 2.38, rel=1e-12)
+    assert height == pytest.approx((0.04 * 1.48 + 0.08 * 2.38) / length, rel=1e-12)
+
+
 def test_single_and_double_are_one_regime() -> None:
     """F/W = mu + u/R_eff; a rigid slider turns on both dishes at once, whatever their friction."""
     single = published_backbone(Bearing.from_sheet(**SINGLE))
