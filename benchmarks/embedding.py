@@ -1,7 +1,7 @@
-"""Cost of a step of a triple pendulum by every door: `python benchmarks/embedding.py`. Tables of docs/embedding.md.
+"""Cost of a step of a triple pendulum by every way: `python benchmarks/embedding.py`. Tables of docs/embedding.md.
 
 First the example of an exported library, run in C and in Python: CPU time of a step, the best of many, and the ratio to
-C. Then a two-port in steps of an analysis by every door (`embedding_ports.py`): with gfortran, fmpy and openseespy where
+C. Then a two-port in steps of an analysis by every way (`embedding_ports.py`): with gfortran, fmpy and openseespy where
 they are installed. Derivatives and lengths of steps in detail: `two_port.py`; states and Model Exchange: `fmu.py`.
 """
 

@@ -1,4 +1,4 @@
-"""Costs of a step of a two-port by every door, for `embedding.py`: C, Fortran, Python, FMU, and OpenSees as a client."""
+"""Costs of a step of a two-port by every way, for `embedding.py`: C, Fortran, Python, FMU, and OpenSees as a client."""
 
 from __future__ import annotations
 
