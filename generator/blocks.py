@@ -81,6 +81,7 @@ class Blocks:
     body_parameters: Block
     surface_parameters: Block
     compliance: Block
+    rim_bound: Block
     top_parameters: Block
     coordinates: Block
     body: Block
@@ -181,6 +182,10 @@ def _parameters(new: Maker) -> dict[str, Block]:
         .scalar("cs", "s/m", "damping of the unilateral contact, over its stiffness and compression")
         .scalar("ca", "-", "cosine of the half-angle of the footprint, friction angle included")
         .scalar("sa", "-", "sine of that angle")
+        .build(),
+        "rim_bound": new("rim_bound")
+        .scalar("cosine", "-", "of the tilt at which the rim is met")
+        .scalar("slope", "m", "derivative of the gap (3.21) by the cosine of the tilt, at that tilt")
         .build(),
         "compliance": new("compliance").scalar("compliance", "m/N", "of the unilateral contact of a surface").build(),
     }

@@ -175,11 +175,23 @@ def seat_compliance(b: Blocks, scene_values: ValueBlocks) -> Program:
     return p
 
 
+def rim_bound(b: Blocks, scene_values: ValueBlocks) -> Program:
+    """Cosine of the tilt at which a rim is met, and the derivative of the gap (3.21) by it, which bounds wide gaps."""
+    p = Program("rim_bound", "tilt at which a rim is met, (3.20) and (3.21): its cosine, and d gap/d cosine")
+    v: Symbols = p.read(scene_values.surface_values, "v")
+    tilt, met = sp.Symbol("tilt"), p.let(v["capacity"] / v["radius"])
+    gap = v["radius"] * (met - tilt)
+    slope = sp.diff(gap, tilt) / sp.diff(sp.cos(tilt), tilt)
+    p.write(b.rim_bound, {"cosine": sp.cos(met), "slope": slope.subs(tilt, met)})
+    return p
+
+
 def programs(b: Blocks, scene_values: ValueBlocks, effects: Effects) -> list[Program]:
     """The programs that make the parameters of a stack from the values of a scene."""
     return [
         body_block(b, scene_values),
         surface_block(b, scene_values, effects),
+        rim_bound(b, scene_values),
         *([seat_compliance(b, scene_values)] if effects.uplift else []),
         top_block(b, scene_values, effects),
     ]

@@ -32,10 +32,11 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
     }
     for (int j = 0; j < NB; ++j) {
         const double sign = signs[j], *values = p->surface_values[j];
-        const double radius = values[MSFP_SURFACE_VALUES_RADIUS], tilt = values[MSFP_SURFACE_VALUES_CAPACITY] / radius;
+        double bound[MSFP_RIM_BOUND_SIZE];
         msfp_surface_block(values, p->body_values[msfp_slider(j)], &sign, p->surface[j]);
-        p->rim_cosine[j] = msfp_cos(tilt);
-        p->rim_slope[j] = radius / msfp_sin(tilt);
+        msfp_rim_bound(values, bound);
+        p->rim_cosine[j] = bound[MSFP_RIM_BOUND_COSINE];
+        p->rim_slope[j] = bound[MSFP_RIM_BOUND_SLOPE];
 #if MSFP_UPLIFT
         double compliance;
         msfp_seat_compliance(values, &compliance);
