@@ -131,7 +131,7 @@ def test_every_program_that_carries_the_motion_is_shown():
     hidden = {"named_points", "body_energy", "top_energy"}  # the same again, or bookkeeping
     hidden |= {"rim_coordinates", "balances", "surface_moment", "rim_motion", "works"}  # gather or add only
     hidden |= {"report_rates", "surface_results", "tilt", "load_end"}  # likewise
-    hidden |= {"extreme_length", "bounded_friction"}  # of rows
+    hidden |= {"extreme_length", "bounded_friction", "rim_bound"}  # of rows; a bound of a gap that is shown
     hidden |= {"surface_block", "top_block"}  # values of the scene under other names
     hidden |= {"twist", "transported_twist", "transported_force", "transported_wrench", "turning_balance"}
     hidden |= {"variation_of_rates", "local_variation", "force_to_local"}
