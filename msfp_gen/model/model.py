@@ -98,11 +98,8 @@ class Ode:
 
     def _accelerations(self, t: float, y: Array) -> tuple[Array, Array, Array, int]:
         """Accelerations, the row of this state, friction rates and Newton iterations. Raises RunError on failure."""
-        given = (*self._split(np.asarray(y)), self._base(t), self.load)
-        found = self.stack.accelerations(*given)
-        if found[0] == "newton":  # trial states of a method, far from the motion: the balances converge there too
-            found = self.stack.accelerations(*given, report=True)
-        status, a, row, rates, _, iterations, *_ = found
+        q, v, h = self._split(np.asarray(y))
+        status, a, row, rates, _, iterations, *_ = self.stack.accelerations(q, v, h, self._base(t), self.load)
         if status != "ok":
             raise RunError(f"as_ode: {status} at t = {t:.6g} s", status=status)
         return a, row, rates, iterations
@@ -280,7 +277,8 @@ class Model:
         status, a, rows, rates = self.stack(bearing, top).many_accelerations(*arrays.values())
         if (failed := np.flatnonzero(status != self.extension.OK)).size:
             raise RunError(
-                f"accelerations: none was found for state {failed[0]}; is it possible, and its load?", status="failed"
+                f"accelerations: none were found for state {failed[0]}; check its angles, rates and load",
+                status="failed",
             )
         return {"acceleration": a, "friction_rate": rates, **self.unpack(rows)}
 

@@ -192,6 +192,14 @@ def test_values_that_are_hardly_meant_are_named(name: str, changes: dict[str, An
     assert any(words in text for text in refusals(scene)) == refused
 
 
+def test_a_grid_in_millimetres_is_refused() -> None:
+    scene = load_scene(HOSPITAL)
+    moved = [replace(mount, position=tuple(1e3 * x for x in mount.position or ())) for mount in scene.bearings]
+    words = "building.bearing: two bearings are 2.704e+04 m apart; are their positions in m?"
+    wide = replace(scene, bearings=tuple(moved))
+    assert words in doubts_of(wide) and words in refusals(wide)
+
+
 def test_a_bearing_with_ground_of_its_own_is_named_once() -> None:
     """Two bearings on one loud record and one on a louder: a line for peak and factor; the ground of the others."""
     scene, loud, louder = building({}), *(building({"motion.scale": scale}).motion for scale in (8.0, 9.0))
