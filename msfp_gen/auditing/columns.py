@@ -137,6 +137,7 @@ def _split(text: str) -> tuple[str, str]:
     return match[1] + match[2], (match[3] or match[4] or "").strip()
 
 
+@np.errstate(over="ignore", invalid="ignore")  # `Histories` refuses numbers that are not finite
 def read_histories(path: str | Path, columns: str | Path | Mapping[str, Any] | None = None) -> Histories:
     """Read the histories of a file.
 

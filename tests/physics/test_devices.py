@@ -115,7 +115,8 @@ def test_arms_of_friction_explain_the_difference(device):
 
 def numbers(page):
     """All numbers of the table: u, and per formula F/W and how far off it is [%]."""
-    rows = [line.split("|")[3:-1] for line in page.splitlines() if line.startswith("|") and "%" in line]
+    table = page.split(devices.MARKS[0])[1].split(devices.MARKS[1])[0]
+    rows = [line.split("|")[3:-1] for line in table.splitlines() if "%" in line]
     return [float(cell.strip(" %")) for row in rows for cell in row]
 
 

@@ -95,8 +95,9 @@ def test_what_cannot_be_read_is_named(tmp_path, text, table, words):
     assert words in str(error.value)
 
 
-def test_numbers_that_are_missing_are_named(tmp_path):
+@pytest.mark.parametrize(("number", "unit"), [("nan", "N"), ("1e308", "kN")])
+def test_numbers_that_are_missing_or_out_of_range_are_named(tmp_path, number, unit):
     file = tmp_path / "out.csv"
-    file.write_text("\n".join(["t,f", *lines(ROWS, ROWS)]).replace("7,7", "7,nan"))
+    file.write_text("\n".join(["t,f", *lines(ROWS, ROWS)]).replace("7,7", f"7,{number}"))
     with pytest.raises(InputError, match=r"out.csv: force_1"):
-        read_histories(file, {"columns": {"time": "t [s]", "force_1": "f [N]"}})
+        read_histories(file, {"columns": {"time": "t [s]", "force_1": f"f [{unit}]"}})
