@@ -22,6 +22,7 @@ from msfp_gen.simulation.simulate import simulate
 from msfp_gen.specification.formula import names_in
 from msfp_gen.specification.friction_laws import BUILT_IN, VARIABLES, Law, law_of
 from msfp_gen.specification.layout import OF_THE_SCENE, Effects
+from msfp_gen.studies.accuracy.error_target import ringing
 
 TOLERANCE = "tolerance"  # in place of an effect, in the row of the numerical error
 TIGHTER = 0.1  # tolerance of the run that measures the numerical error, over the scene's tolerance
@@ -72,13 +73,15 @@ class EffectChange:
 class EffectStudy:
     """Every effect of a system changed alone. error: the numerical error of each quantity, as `EffectChange.changes`.
 
-    undecided: limits that lie within the numerical error of what the system reaches.
+    undecided: limits that lie within the numerical error of what the system reaches. rings: whether nothing damps the
+    ringing of stuck sliders, of which `error` may have too little.
     """
 
     name: str
     changes: tuple[EffectChange, ...]
     error: Mapping[str, float]
     undecided: tuple[str, ...]
+    rings: bool = False
 
     @property
     def tables(self) -> list[Table]:
@@ -91,6 +94,9 @@ class EffectStudy:
             for one in self.changes
         ]  # fmt: skip
         about = [("tolerance", "the first row is the numerical error; changes that are smaller are shown as 0")]
+        if self.rings:
+            rings = "nothing damps the ringing of stuck sliders, which both runs of the first row may filter"
+            about.append(("ringing", f"{rings}: give contact_damping, or take the error of run --error"))
         about += [("undecided", f"{name}: the limit lies within the numerical error") for name in self.undecided]
         about += [(f"{one.effect} = {one.after}", one.why) for one in self.changes if one.why]
         return [
@@ -143,7 +149,7 @@ def effect_by_effect(system: System, say: Say = lambda _: None, only: Collection
         else:
             found.append(_change(effect, before, after, base, other, states, _states(other, noise)))
     undecided = tuple(key for key, state in states.items() if state == "undecided")
-    return EffectStudy(system.name, tuple(found), found[0].changes, undecided)
+    return EffectStudy(system.name, tuple(found), found[0].changes, undecided, ringing(system)[1])
 
 
 def _run(system: System) -> tuple[EffectRun, dict[str, Any]]:

@@ -232,7 +232,7 @@ def simulate_within(
     return replace(within, result=replace(result, provenance=result.provenance | provenance))
 
 
-def _ringing(system: System) -> tuple[float, bool]:
+def ringing(system: System) -> tuple[float, bool]:
     """Longest period of a slider on its stuck surface [s]; infinite without inertia. Whether nothing damps it."""
     bearings = zip(system.every_bearing, system.every_effects, system.loads_at_rest, strict=False)
     period, rings = 0.0, False
@@ -260,7 +260,7 @@ class _Search:
         self.trials: dict[int, Trial] = {}
         self.references: dict[int, Trial] = {}  # index of a run -> its reference run
         self.reference_scene = scene.with_all_effects()
-        self.period, self.rings = _ringing(self.reference_scene)
+        self.period, self.rings = ringing(self.reference_scene)
         self.filtered = False  # whether the reference runs filter undamped ringing, which no estimate then includes
 
     def solver(self, index: int) -> Solver:

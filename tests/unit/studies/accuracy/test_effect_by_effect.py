@@ -62,6 +62,12 @@ def test_a_limit_at_the_value_is_undecided():
     assert len(study.undecided) == 1 and "the limit lies within the numerical error" in study.tables[1].text
 
 
+@pytest.mark.parametrize(("damping", "rings"), [(0.0, True), (1e-3, False)])
+def test_a_numerical_error_without_the_ringing_says_so(damping, rings):
+    study = effect_by_effect(replace(SCENE, bearing=SCENE.bearing.replace(contact_damping=damping)), only=("spin",))
+    assert ("contact_damping" in study.tables[1].text) == rings
+
+
 def test_limits_that_an_effect_crosses_are_named():
     noise = {"force": 0.1, "gap": 0.1}
     base = outcome([2.0, 4.0], force=0.5, gap=3.0)
