@@ -56,6 +56,18 @@ SEED, COUNT = 21, 30
 WINDOW, SECONDS = 6.0, pick(4.0, 0.5)  # [s] of the records of buildings, the strongest, and of their runs
 OF_PRESETS = {"limit": 1200.0, "tight": 1e-7}  # of `promise`
 OF_BUILDINGS = {"budget": 1200.0, "limit": 1200.0, "tight": 1e-5}  # of `promise`
+
+
+def soil(stiffness: float) -> dict[str, float]:
+    """Soil below one bearing. stiffness: horizontal [N/m]; the vertical one is twice as large, and each is damped."""
+    return {
+        "stiffness": stiffness,
+        "vertical_stiffness": 2 * stiffness,
+        "damping": 0.01 * stiffness,
+        "vertical_damping": 0.02 * stiffness,
+    }
+
+
 VARIATIONS: dict[str, dict[str, Any]] = {  # of the hospital on four bearings, by turns under the records of both
     "four bearings": {},
     "four bearings, half the record": {"motion.scale": 0.5},
@@ -68,6 +80,8 @@ VARIATIONS: dict[str, dict[str, Any]] = {  # of the hospital on four bearings, b
     "four bearings, all effects by choice": {"building.effects": {}},
     "four bearings, damping 2 %, up to 60 Hz": {"building.damping_ratio": 0.02, "building.highest_frequency": 60.0},
     "four bearings, hard ground": {"building.interface.vertical_stiffness": 1e10},
+    "four bearings on firm soil": {"building.soil": soil(200e6)},
+    "four bearings on soft soil": {"building.soil": soil(50e6)},
 }
 ROOT = Path(__file__).resolve().parents[1]
 

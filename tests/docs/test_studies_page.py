@@ -51,7 +51,8 @@ def test_commands_of_the_page_print_what_it_shows(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     part = PAGE.partition("## From a study file to a figure")[2].partition("\n## ")[0]
-    plain = [text.splitlines() for language, text in BLOCKS if not language and text in part]
+    whole = [re.sub(r"\\\n\s*", " ", text) for language, text in BLOCKS if not language and text in part]
+    plain = [text.splitlines() for text in whole]
     commands = [line for block in plain for line in block if line.startswith("msfp-gen ")]
     assert len(commands) == 3
     for command in commands:

@@ -35,7 +35,7 @@ def a_scene(
         law = {"reference_pressure": 3e7, "patch_radius": 0.05}
     damping = 0.0 if shaken else 1e-4  # of bodies that part: which rims they meet hangs on it
     contact = {"yield_displacement": 2e-3, "contact_damping": damping}
-    surface = a_surface(0.5, capacity=0.02, rim_damping=50.0, rim_stiffness=1e6, **contact, **law)
+    surface = a_surface(0.5, capacity=0.014 if shaken else 0.02, rim_damping=50.0, rim_stiffness=1e6, **contact, **law)
     bearing = Bearing(
         layout=Layout(*layout),
         base_height=0.02,
