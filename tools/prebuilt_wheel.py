@@ -11,6 +11,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -40,11 +41,12 @@ def main() -> None:
     options.add_argument("-o", "--output", type=Path, default=Path("wheels"), help="folder of the result")
     given = options.parse_args()
     zig = zig_program()
-    if zig is None and QUICK:
-        print("left out, since ziglang is not installed (pip install -e .[wheels]): the wheel")
+    missing = " and ".join(name for name, found in (("ziglang", zig), ("wheel", find_spec("wheel"))) if not found)
+    if missing and QUICK:
+        print(f"left out, since {missing} is not installed (pip install -e .[wheels]): the wheel")
         return
-    if zig is None:
-        raise SystemExit("error: ziglang is not installed: pip install -e .[wheels]")
+    if zig is None or missing:
+        raise SystemExit(f"error: {missing} is not installed: pip install -e .[wheels]")
     with TemporaryDirectory() as folder, TemporaryDirectory() as built:
         output = Path(built) if QUICK else given.output
         output.mkdir(parents=True, exist_ok=True)
