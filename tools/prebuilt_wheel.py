@@ -11,7 +11,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -40,8 +39,9 @@ def main() -> None:
     )
     options.add_argument("-o", "--output", type=Path, default=Path("wheels"), help="folder of the result")
     given = options.parse_args()
-    zig = zig_program()
-    missing = " and ".join(name for name, found in (("ziglang", zig), ("wheel", find_spec("wheel"))) if not found)
+    zig, tool = zig_program(), [sys.executable, "-m", "wheel"]
+    packs = subprocess.run([*tool, "version"], capture_output=True).returncode == 0
+    missing = " and ".join(name for name, found in (("ziglang", zig), ("wheel", packs)) if not found)
     if missing and QUICK:
         print(f"left out, since {missing} is not installed (pip install -e .[wheels]): the wheel")
         return
@@ -50,7 +50,6 @@ def main() -> None:
     with TemporaryDirectory() as folder, TemporaryDirectory() as built:
         output = Path(built) if QUICK else given.output
         output.mkdir(parents=True, exist_ok=True)
-        tool = [sys.executable, "-m", "wheel"]
         subprocess.run([*tool, "unpack", given.wheel or pure_wheel(Path(built)), "-d", folder], check=True)
         (unpacked,) = Path(folder).iterdir()
         check_sources(unpacked)
