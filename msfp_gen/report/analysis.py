@@ -160,7 +160,7 @@ def analysis_html(
         identity=Chunks(study, Path(folder)).identity,
         inputs=_inputs(study, bounds, scene),
         lead=_lead(bounds, rows),
-        outcome=_outcome(bounds),
+        outcome=_outcome(bounds.ended.size, len(bounds.failures), len(bounds.stopped), len(bounds.exceeded)),
         verdict="failed" if failed else "exceeded" if exceeded else "within",
         sections=list(_numbered(sections)),
         terms=terms_shown(TERMS),
@@ -366,11 +366,10 @@ def _lead(bounds: SuiteBounds, rows: Any) -> str:
     )
 
 
-def _outcome(bounds: SuiteBounds) -> str:
-    runs = bounds.ended.size
-    early = len(bounds.failures) + len(bounds.stopped)
+def _outcome(runs: int, failed: int, stopped: int, exceeded: int) -> str:
+    """How many runs ended early, by failure or by a stop, and how many exceeded a limit."""
+    early = failed + stopped
     ended = f"{early} of {runs} runs did not reach their end" if early else f"All {runs} runs reached their end"
-    exceeded, failed = len(bounds.exceeded), len(bounds.failures)
     of = f"the {runs - failed} that did not fail" if failed else f"{runs}"  # the others may be beyond limits: the table
     if exceeded:
         limits = f"{exceeded} of {of} exceeded limits of the device"

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from html import escape
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -361,15 +360,9 @@ def test_what_was_compared_is_what_tests_compare() -> None:
 
 def test_runs_that_ended_early_are_not_among_those_within_the_limits() -> None:
     """What a run that failed had reached until then may be beyond a limit; the table of shares has it."""
-    run = ("CCC", "lower")
-
-    def outcome(failures: Any, exceeded: Any) -> str:
-        return _outcome(SimpleNamespace(ended=np.ones(6), failures=failures, stopped={}, exceeded=exceeded))  # type: ignore[arg-type]
-
-    assert outcome({}, {}) == "All 6 runs reached their end; none exceeded a limit of the device."
-    assert outcome({run: ""}, {}) == (
+    assert _outcome(6, 0, 0, 0) == "All 6 runs reached their end; none exceeded a limit of the device."
+    assert _outcome(6, 1, 0, 0) == (
         "1 of 6 runs did not reach their end; none of the 5 that did not fail exceeded a limit of the device."
     )
-    assert outcome({run: ""}, {("CLC", "lower"): ""}).endswith(
-        "; 1 of the 5 that did not fail exceeded limits of the device."
-    )
+    assert _outcome(6, 1, 1, 1).startswith("2 of 6 runs did not")
+    assert _outcome(6, 1, 0, 1).endswith("; 1 of the 5 that did not fail exceeded limits of the device.")
