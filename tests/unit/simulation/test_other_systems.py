@@ -272,6 +272,7 @@ BARE = Kind("pair", lambda *args: Bare(pair_from_table(*args).half), lambda _: i
         (("plot", "--figure", "all", "-o", "figures"), "--figure = 'all': this system has no figures; its rows are in"),
         (("plot", "-o", "p.png"), "--figure = 'overview': this system has no figures; its rows are in"),
         (("bound", "-o", "b"), "this system has no bearings that can be changed"),
+        (("fmu", "-o", "b"), "this is not one bearing alone; give a scene of one bearing here"),
     ],
 )
 def test_what_a_kind_does_not_define_is_one_line(
