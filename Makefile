@@ -21,8 +21,8 @@ demo: $(RUNS)
 test: $(STAMP)
 	$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow"
 
-# With the programs that benchmarks compare with, where they exist for this machine.
-slow: $(PEERS)
+# With the programs that benchmarks compare with, where they exist for this machine, and what builds the site.
+slow: $(PEERS) $(SITE)
 	$(BIN)/python -m pytest -q -n auto --dist loadfile -m slow
 
 lint: $(STAMP)

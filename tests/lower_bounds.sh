@@ -12,7 +12,7 @@ trap 'rm -rf "$folder"' EXIT
 "$bin/uv" venv -q --python "$bin/python" "$folder/venv"
 "$bin/uv" pip install -q --python "$folder/venv" --resolution lowest-direct -r pyproject.toml
 "$bin/uv" pip install -q --python "$folder/venv" --no-deps -e .
-"$bin/uv" pip install -q --python "$folder/venv" pytest hypothesis pytest-benchmark pytest-xdist
+"$bin/uv" pip install -q --python "$folder/venv" pytest hypothesis pytest-xdist
 MSFP_GEN_CACHE=$folder/models "$folder/venv/bin/msfp-gen" run fenz-test1 --json >/dev/null
 # Its own log: the summary of pytest that CI ends with is the one of `make test`.
 "$folder/venv/bin/python" -m pytest -q -n auto --dist loadfile -o filterwarnings= -m "not slow" \

@@ -155,10 +155,12 @@ class Histories:
 def histories_of(result: Any) -> Histories:
     """The histories of a result of this package: of one bearing, with its ends and surfaces.
 
-    Raises InputError for results of buildings.
+    Raises InputError for results of several bearings, and for one of them.
     """
     if not result.is_alone:
-        raise InputError("result: this is the result of a building; give one of its .bearings as a table of columns")
+        raise InputError(
+            "result: this is no run of one bearing alone; give the columns of one of its .bearings as a table"
+        )
     rows, top = result.history, result.scene.top
     force = rows.interface_force[:, -1]  # without inertia of the upper plate, which hangs on the mass at lift-off
     columns = {"time": rows.time, "axial": force[:, 2], "rise": -rows.displacement[:, 2]}

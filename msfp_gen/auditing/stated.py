@@ -202,7 +202,7 @@ def stated_of(source: Any) -> Stated:
                 return Stated(str(table.get("name") or path), bearing, _law(bearing))
             scene = scene_of(table, None if path is None else path.parent)
             if not isinstance(scene, Scene):
-                raise InputError("this has more than one bearing; give a scene or a data sheet of one bearing")
+                raise InputError("this is not one bearing alone; give a scene or a data sheet of one bearing")
     mass = scene.top.mass if isinstance(scene.top, MassTop) else None
     law = scene.law[1]
     if law is not None and law.word == "pv" and scene.effects.friction is None:

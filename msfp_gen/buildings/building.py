@@ -185,10 +185,10 @@ class Building(Printed):
         """The building with the coordinates of `boundary` fixed. Raises InputError where other parts move freely."""
         from scipy.linalg import eigh
 
-        held = np.asarray(self.boundary, dtype=int)
-        inner = np.setdiff1d(np.arange(len(self.mass)), held)
+        boundary = np.asarray(self.boundary, dtype=int)
+        inner = np.setdiff1d(np.arange(len(self.mass)), boundary)
         if not inner.size:
-            return FixedBase(held, inner, np.zeros((0, held.size)), np.zeros(0), *2 * (np.zeros((0, 0)),))
+            return FixedBase(boundary, inner, np.zeros((0, boundary.size)), np.zeros(0), *2 * (np.zeros((0, 0)),))
         k, m = self.stiffness[np.ix_(inner, inner)], self.mass[np.ix_(inner, inner)]
         lowest = float(np.linalg.eigvalsh(k)[0])
         if lowest <= 1e-14 * float(np.abs(k).max()):
@@ -201,8 +201,8 @@ class Building(Printed):
         with_mass = squares > 1e-14 * max(float(squares[-1]), 0.0)
         order = np.flatnonzero(with_mass)[::-1]
         modes = vectors[:, order] / np.sqrt(squares[order])
-        follow = -np.linalg.solve(k, self.stiffness[np.ix_(inner, held)])
-        return FixedBase(held, inner, follow, 1 / np.sqrt(squares[order]), modes, vectors[:, ~with_mass])
+        follow = -np.linalg.solve(k, self.stiffness[np.ix_(inner, boundary)])
+        return FixedBase(boundary, inner, follow, 1 / np.sqrt(squares[order]), modes, vectors[:, ~with_mass])
 
     @cached_property
     def oscillators(self) -> Oscillators:

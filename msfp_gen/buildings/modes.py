@@ -88,21 +88,21 @@ def plot_modes(scene: BuildingScene, modes: Modes, path: str | Path | None = Non
     return figure
 
 
-def _unreduced(scene: BuildingScene, given: Mapping[str, Any]) -> BuildingScene:
+def _unreduced(scene: BuildingScene, table: Mapping[str, Any]) -> BuildingScene:
     """The scene with all modes: a reduced building no longer tells the mass of its base from the mass above."""
     from msfp_gen.buildings.file import building_from_table
 
-    frame = {name: value for name, value in given.get("building", {}).items() if name != "highest_frequency"}
-    whole = building_from_table({**given, "building": frame}, parts={"motion": scene.motion})
+    frame = {name: value for name, value in table.get("building", {}).items() if name != "highest_frequency"}
+    whole = building_from_table({**table, "building": frame}, parts={"motion": scene.motion})
     return whole if isinstance(whole, BuildingScene) else scene
 
 
-def storey_table(given: Mapping[str, Any]) -> Table | None:
+def storey_table(table: Mapping[str, Any]) -> Table | None:
     """The storeys of a `[building]` table, as given, from the top; None where it has matrices in their place."""
-    storeys = given.get("storey")
+    storeys = table.get("storey")
     if not storeys:
         return None
-    levels = [("base", given.get("base", {})), *((str(number), storey) for number, storey in enumerate(storeys, 1))]
+    levels = [("base", table.get("base", {})), *((str(number), storey) for number, storey in enumerate(storeys, 1))]
     known = [name for name in STOREY if any(name in level for _, level in levels)]
     rows = [(label, *(_cell(level.get(name)) for name in known)) for label, level in reversed(levels)]
     title = "base and storeys as given; SI units where none stands"
@@ -117,12 +117,12 @@ def _cell(value: Any) -> str:
     return value if isinstance(value, str) else f"{value:.4g}"
 
 
-def structure(scene: BuildingScene, given: Mapping[str, Any]) -> tuple[list[Table], list[tuple[str, Figure]]]:
-    """Tables and figures, with their captions, of the superstructure. given: the table of the scene."""
-    storeys, kept = storey_table(given.get("building", {})), len(scene.building.frequencies)
+def structure(scene: BuildingScene, table: Mapping[str, Any]) -> tuple[list[Table], list[tuple[str, Figure]]]:
+    """Tables and figures, with their captions, of the superstructure. table: of the scene."""
+    storeys, kept = storey_table(table.get("building", {})), len(scene.building.frequencies)
     if not kept:
         return [storeys] if storeys else [], []
-    modes = Modes(*(values[:kept] for values in modes_of(_unreduced(scene, given))))
+    modes = Modes(*(values[:kept] for values in modes_of(_unreduced(scene, table))))
     caption = (
         f"Shapes of the first {min(DRAWN, len(modes.frequencies))} modes on a fixed base, at the centres of mass; "
         "rotation as the motion of a corner of the plan"

@@ -62,7 +62,7 @@ class Oscillators:
     def of(cls, fixed: FixedBase, mass: Array, damping: Array, stiffness: Array) -> Oscillators:
         """A building of these matrices; where damping couples its modes, all its coordinates are attachments."""
         size, c, m = len(mass), len(fixed.boundary), len(fixed.frequencies)
-        held = np.ix_(fixed.boundary, fixed.boundary)
+        on_boundary = np.ix_(fixed.boundary, fixed.boundary)
         static, modes, still = np.zeros((size, c)), np.zeros((size, m)), np.zeros((size, size - c - m))
         static[fixed.boundary], static[fixed.inner] = np.eye(c), fixed.follow
         modes[fixed.inner], still[fixed.inner] = fixed.modes, fixed.still
@@ -75,7 +75,7 @@ class Oscillators:
         carried = mass[np.ix_(fixed.boundary, fixed.inner)] @ fixed.modes
         return cls(
             np.hstack([static - modes @ shares.T, modes]),
-            mass[held] - carried @ carried.T,
+            mass[on_boundary] - carried @ carried.T,
             rates[:c, :c],
             _symmetric(static.T @ stiffness @ static),
             shares,
@@ -84,15 +84,17 @@ class Oscillators:
         )
 
 
-def _damping_of(motions: Array, held: int, mass: Array, damping: Array, stiffness: Array, frequency: float) -> Array:
+def _damping_of(
+    motions: Array, attached: int, mass: Array, damping: Array, stiffness: Array, frequency: float
+) -> Array:
     """Damping in the coordinates of some motions, shape (motions, motions) [SI]; what rounding leaves is zero."""
-    # The first `held` motions are motions of attachments. frequency: circular, with which forces of masses and of
+    # The first `attached` motions are motions of attachments. frequency: circular, with which forces of masses and of
     # springs are compared [rad/s].
     sizes = [np.einsum("ij,ij->j", motions, matrix @ motions) for matrix in (mass, stiffness)]
     scale = np.sqrt(np.maximum(sizes[0] * frequency + sizes[1] / frequency, 0.0))
     rates = motions.T @ damping @ motions
     felt = np.abs(rates) > UNCOUPLED * np.outer(scale, scale)
-    felt[:held, :held] = felt[:held, :held].any()
+    felt[:attached, :attached] = felt[:attached, :attached].any()
     found: Array = _symmetric(np.where(felt, rates, 0.0))
     return found
 

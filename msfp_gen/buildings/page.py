@@ -10,6 +10,7 @@ import numpy as np
 from msfp_gen.buildings.figures import DEPTH, height_of, level_of, plan_of, size_of
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
+from msfp_gen.report.compared import Comparison
 from msfp_gen.report.frames import FEWEST, packed
 from msfp_gen.report.page import TERMS as BEARING_TERMS
 from msfp_gen.report.page import Page
@@ -33,6 +34,20 @@ TERMS = (
     ("left", "capacity of a surface less its sliding: what remains until the slider meets the rim of its dish."),
     ("rim", "the raised edge of a dish. Inner sliders of a triple pendulum meet theirs in strong motion."),
 )  # fmt: skip
+COMPARISONS = (
+    Comparison(
+        "superstructure on its bearings",
+        "closed forms; an eccentric frame under a record in OpenSees",
+        "buildings",
+        ("physics/test_buildings.py", "physics/test_building_opensees.py"),
+    ),
+    Comparison(
+        "uplift of bearings below a building",
+        "statics, energy, smaller tolerances",
+        "uplift",
+        ("physics/test_building_uplift.py",),
+    ),
+)
 
 
 def magnification(result: BuildingResult) -> int:

@@ -288,11 +288,18 @@ class BuildingScene(Printed, OtherSystem):
 
         return FIGURES
 
-    def structure(self, given: Mapping[str, Any]) -> Any:
+    def structure(self, table: Mapping[str, Any]) -> Any:
         """What a report shows of the superstructure; see `report.analysis.structure_of`."""
         from msfp_gen.buildings.modes import structure
 
-        return structure(self, given)
+        return structure(self, table)
+
+    @property
+    def comparisons(self) -> Sequence[Any]:
+        """What superstructures were compared with; see `report.compared.comparisons_of`."""
+        from msfp_gen.buildings.page import COMPARISONS
+
+        return COMPARISONS
 
     def quantities(self) -> dict[str, ColumnSource]:
         """What tables report of a run; see `results.quantities.quantities`."""

@@ -63,24 +63,24 @@ def _short(values: Array) -> list[float]:
 
 def floor_spectra(result: Any, periods: ArrayLike | None, damping: float) -> FloorSpectra:
     """The spectra of a `BuildingResult`; arguments and errors as in `BuildingResult.floor_spectra`."""
-    given = PERIODS if periods is None else np.asarray(periods, dtype=float)
-    if given.ndim != 1 or not given.size or not np.all((given > 0) & np.isfinite(given)):
-        raise InputError(f"periods = {given.tolist()!r:.60}: give a list of positive numbers [s]")
+    chosen = PERIODS if periods is None else np.asarray(periods, dtype=float)
+    if chosen.ndim != 1 or not chosen.size or not np.all((chosen > 0) & np.isfinite(chosen)):
+        raise InputError(f"periods = {chosen.tolist()!r:.60}: give a list of positive numbers [s]")
     if not 0 < damping < 1:
         raise InputError(f"damping = {damping!r}: give a ratio above 0 and below 1")
     nodes = result.scene.building.nodes
     time, end = result.steps.time, float(result.steps.time[-1])
     sampled = np.linspace(0.0, end, max(2, round(end / SAMPLE) + 1))
-    at_nodes, at_corners = np.zeros((2, len(nodes), len(given), 3))
+    at_nodes, at_corners = np.zeros((2, len(nodes), len(chosen), 3))
     if not end > 0:  # a run that ended at its start
-        return FloorSpectra(given, float(damping), tuple(node.name for node in nodes), at_nodes, at_corners)
+        return FloorSpectra(chosen, float(damping), tuple(node.name for node in nodes), at_nodes, at_corners)
     for index, node in enumerate(nodes):
         motion = result.steps.acceleration[:, index]
         motion = np.column_stack([np.interp(sampled, time, freedom) for freedom in motion.T])
         points = corner_points(result.scene, node.position) if node.floor else node.position[None]
         arms = np.concatenate([rigid(point - node.position)[:3] for point in points])
-        for row, period in enumerate(given):
+        for row, period in enumerate(chosen):
             response = displacements(motion, float(sampled[1]), float(period), damping) * (2 * np.pi / period) ** 2
             at_nodes[index, row] = np.abs(response[:, :3]).max(axis=0)
             at_corners[index, row] = np.abs(response @ arms.T).max(axis=0).reshape(-1, 3).max(axis=0)
-    return FloorSpectra(given, float(damping), tuple(node.name for node in nodes), at_nodes, at_corners)
+    return FloorSpectra(chosen, float(damping), tuple(node.name for node in nodes), at_nodes, at_corners)

@@ -91,10 +91,10 @@ def batch(
         loaded = None if suite is None else load_suite(suite, progress)
     records, target = ((), None) if loaded is None else (loaded.records, loaded.target)
     chosen = [variation for source in sources for variation in variations(source, fields, records)]
-    made = [variation.scene for variation in chosen]
-    require_meant(*made, force=force)
+    scenes = [variation.scene for variation in chosen]
+    require_meant(*scenes, force=force)
     about = target_doubts(target)
-    note_doubts([(scene.name, [*about, *doubts(scene)]) for scene in made])
+    note_doubts([(scene.name, [*about, *doubts(scene)]) for scene in scenes])
     rows: list[Row] = []
     with _reported(rows, len(chosen), table, as_json), using_sign(sign):
         _run(chosen, workers, output, rows)

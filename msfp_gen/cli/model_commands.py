@@ -173,10 +173,10 @@ def cache(
     if not clear and prune is None:
         _list(cache.cached_models())
         return
-    removed, held = cache.prune(0.0 if clear or prune is None else prune)
+    removed, in_use = cache.prune(0.0 if clear or prune is None else prune)
     say(f"removed {_count(removed)}, {_megabytes(cache.total(removed))}")
-    if held:
-        say(f"kept {_count(held)} in use by another process")
+    if in_use:
+        say(f"kept {_count(in_use)} in use by another process")
 
 
 def _list(items: list[CachedModel]) -> None:

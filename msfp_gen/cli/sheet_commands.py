@@ -160,8 +160,8 @@ def _on_bearings(file: Path, bearing: Bearing) -> tuple[str, float | None]:
             return "", None
         # Loads at rest need no ground motion, and a project may have no records yet.
         unused = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}
-        building = {key: table[key] for key in (kind.key, "bearings") if key in table}
-        scene = scene_of({**building, "motion": unused}, file.parent)
+        tables = {key: table[key] for key in (kind.key, kind.named) if key in table}
+        scene = scene_of({**tables, "motion": unused}, file.parent)
     weight, count = sum(scene.loads_at_rest), len(scene.every_bearing)
     equal = sum(each == bearing for each in scene.every_bearing)
     if equal < count:

@@ -141,8 +141,8 @@ def total_displacement(
 
     Raises InputError for a value out of range.
     """
-    given = {"displacement": displacement, "width": width, "depth": depth, "torsion_ratio": torsion_ratio}
-    for name, value in given.items():
+    positive = {"displacement": displacement, "width": width, "depth": depth, "torsion_ratio": torsion_ratio}
+    for name, value in positive.items():
         if not value > 0:
             raise InputError(f"{name} = {value:g}: give a number above 0")
     for name, value in {"arm": arm, "eccentricity": eccentricity}.items():

@@ -263,10 +263,10 @@ class Model:
             raise InputError("accelerations: a massless model does not determine them; use sliders = 'inertial'")
         shape, count = self._shape, len(np.asarray(q))
         shapes = {"q": shape, "v": shape, "h": (shape[0], 2), "base": (3, 6), "load": (6,)}
-        given = {"q": q, "v": v, "h": h, "base": np.zeros((3, 6)) if base is None else base}
+        state = {"q": q, "v": v, "h": h, "base": np.zeros((3, 6)) if base is None else base}
         arrays = {
             name: many(value, name, shapes[name], count)
-            for name, value in (given | {"load": np.zeros(6) if load is None else load}).items()
+            for name, value in (state | {"load": np.zeros(6) if load is None else load}).items()
         }
         if self.planar:
             coordinates = [0, 2, *range(4, shape[1], 3)]  # psi, phi, and with uplift the separation along E2

@@ -119,8 +119,8 @@ class SymbolicModel:
 
     def __str__(self) -> str:
         """All sections as text: a line for each row, after the statements that no section before it has."""
-        given = ("state", "unknowns", "inputs", "parameters")
-        lines = [f"# {name}\n{', '.join(map(str, getattr(self, name)))}" for name in given if getattr(self, name)]
+        inputs = ("state", "unknowns", "inputs", "parameters")
+        lines = [f"# {name}\n{', '.join(map(str, getattr(self, name)))}" for name in inputs if getattr(self, name)]
         lines += [f"# {name}: {SECTIONS[name]}\n{section}" for name, section in self._sections()]
         return "\n\n".join(lines)
 

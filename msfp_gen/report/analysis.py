@@ -36,7 +36,7 @@ from msfp_gen.figures.style import (
     panels,
     plain,
 )
-from msfp_gen.report.compared import compared_table
+from msfp_gen.report.compared import COMPARISONS, OF_SHEETS, compared_table, comparisons_of
 from msfp_gen.report.frames import picture, render, write_page
 from msfp_gen.report.page import NO_TITLE, TERMS, TitleBlock, bearing_kind, terms_shown
 from msfp_gen.report.repeated import (
@@ -92,9 +92,9 @@ class Section:
 
 
 @singledispatch
-def structure_of(scene: Any, given: Mapping[str, Any]) -> tuple[list[Table], list[Captioned]]:
-    """Tables and figures of the superstructure of a system. given: the table of its file."""
-    found: tuple[list[Table], list[Captioned]] = scene.structure(given)
+def structure_of(scene: Any, table: Mapping[str, Any]) -> tuple[list[Table], list[Captioned]]:
+    """Tables and figures of the superstructure of a system. table: of its file."""
+    found: tuple[list[Table], list[Captioned]] = scene.structure(table)
     return found
 
 
@@ -240,10 +240,10 @@ def _last_sections(
         "These comparisons are of the program, in its tests, and none is of this structure. Each page of the "
         "documentation says what was compared, and how large the differences were."
     )
-    kinds = set(study.table["scene"])  # names of its tables, such as "building"
-    if any("sheet" in given for given in bearing_tables(study.table["scene"]).values()):
-        kinds.add("sheet")
-    yield Section("Which parts of the program were compared with what", (words,), [compared_table(kinds)])
+    comparisons = [*comparisons_of(scene), *COMPARISONS]
+    if any("sheet" in table for table in bearing_tables(study.table["scene"]).values()):
+        comparisons.append(OF_SHEETS)
+    yield Section("Which parts of the program were compared with what", (words,), [compared_table(comparisons)])
     settings = (table for table in explain(scene) if not table.title.endswith(DOUBTFUL))  # of all runs: `doubt_table`
     words = (
         f"The tables are of one run, {bounds.records[0]} at nominal friction. The other runs differ in the record, in "
@@ -417,12 +417,12 @@ def _bearing_section(study: Study, scene: Any) -> Section:
     scene_table = study.table["scene"]
     tables: list[Table] = []
     figures: list[Captioned] = []
-    for kind, given in bearing_tables(scene_table).items():
-        if "sheet" not in given:
+    for kind, table in bearing_tables(scene_table).items():
+        if "sheet" not in table:
             continue
         name = kind or str(scene_table.get("name") or "bearing")
-        data: Sheet = parsed_sheet(given)
-        report = SheetReport(name, data, bearing_from_table(given))
+        data: Sheet = parsed_sheet(table)
+        report = SheetReport(name, data, bearing_from_table(table))
         tables += report.tables
         caption = f"{name}: section to scale, published backbone; dots: displacements of the effective properties"
         figures.append((caption, plot_sheet(report, table=False)))

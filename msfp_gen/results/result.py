@@ -216,6 +216,15 @@ class AnyResult(Printed):
         return self.status + (f": {self.message}" if self.message else "")
 
     @property
+    def page(self) -> Any:
+        """What a report has of the run; see `report.page.page_of`. Raises InputError: this kind of result has none."""
+        raise InputError(f"{self.title}: results of this kind have no report; their rows are in `msfp-gen export`")
+
+    def film(self, times: Array, azimuth: float | None) -> Any:
+        """The movie of the run; see `figures.movie.film_of`. Raises InputError: this kind of result has none."""
+        raise InputError(f"{self.title}: results of this kind have no movie; their rows are in `msfp-gen export`")
+
+    @property
     def stated_rows(self) -> LabelledValues:
         """Label and value of the main results after the status and the verdict."""
         return [("status", self.status_text), ("verdict", self.verdict.text), *self.main_results()]

@@ -30,8 +30,8 @@ def response_time(bearing: Bearing, top: Top, load: float) -> float:
     [N]; inf without load.
     """
     longest, radii = 0.0, [surface.radius for surface in bearing.surfaces]
-    held = top.stiffness if isinstance(top, RigTop) else 0.0
-    above = [*(load / radius for radius in radii[1:]), held]
+    rig = top.stiffness if isinstance(top, RigTop) else 0.0
+    above = [*(load / radius for radius in radii[1:]), rig]
     for radius, stiffness, body in zip(radii, above, bearing.bodies, strict=True):
         longest = max(longest, body.mass / (load / radius + stiffness) if load > 0 else inf)
     return float(np.sqrt(longest))

@@ -144,15 +144,16 @@ class OtherSystem(ABC):
     energy_compared: ClassVar[tuple[str, str]] = ENERGY_COMPARED
     longest_row_step: ClassVar[tuple[float, str]] = (math.inf, "")  # rows of other systems are few
     stop: ClassVar[None] = None
-    own_motions: Any = ()  # a property of buildings
+    own_motions: Any = ()  # a property of some kinds, as the next
+    comparisons: Any = ()  # of their parts with others; see `report.compared.comparisons_of`
     name: Any
 
     def text(self) -> str:
         """It as the text of a scene file, for files of results and checkpoints. Raises InputError: it has none."""
         raise InputError(f"{self.name}: this system cannot be written as a scene file; leave the file out")
 
-    def structure(self, given: Mapping[str, Any]) -> Any:
-        """Tables and figures of the superstructure; see `report.analysis.structure_of`. given: the scene's table."""
+    def structure(self, table: Mapping[str, Any]) -> Any:
+        """Tables and figures of the superstructure; see `report.analysis.structure_of`. table: of the scene file."""
         return [], []
 
     @abstractmethod

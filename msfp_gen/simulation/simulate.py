@@ -101,12 +101,12 @@ def simulate(  # noqa: D417 - the docstring lists the options one by one
     """
     if not is_system(scene):
         raise InputError(f"scene: a {type(scene).__name__} is no scene; give what load_scene returns")
-    given = {name: value for name, value in options.items() if value or name in scene.run_options}
-    if unknown := sorted(given.keys() - scene.run_options):
+    chosen = {name: value for name, value in options.items() if value or name in scene.run_options}
+    if unknown := sorted(chosen.keys() - scene.run_options):
         raise InputError(f"{unknown[0]}: the run of this scene has no such option; leave it out")
     if checkpoint is None and resume:
         raise InputError("resume: needs the checkpoint to resume from; give checkpoint")
-    result = integrate(scene, progress=progress, checkpoint=checkpoint, every=every, resume=resume, **given)
+    result = integrate(scene, progress=progress, checkpoint=checkpoint, every=every, resume=resume, **chosen)
     if not result.succeeded:
         raise RunError(result.message, status=result.status, result=result)
     return result

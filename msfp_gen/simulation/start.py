@@ -207,9 +207,9 @@ def start_compiled_run(
         options["first_step"] = 0.0
         if (memory := at.memory_of(model.effects.law)) is not None:
             options["memory"] = memory
-    given = run_arguments(scene, model.spec, frame, state, end)
+    arguments = run_arguments(scene, model.spec, frame, state, end)
     run: CompiledBearingRun = model.extension.Run(
-        model.extension.Stack(*given.stack), *given.arrays, **given.options | options
+        model.extension.Stack(*arguments.stack), *arguments.arrays, **arguments.options | options
     )
     return run, frame.azimuth
 
@@ -217,9 +217,9 @@ def start_compiled_run(
 def first_arguments(scene: Scene, spec: ModelSpec) -> tuple[RunArguments, float]:
     """The arguments with which a model without uplift starts, and the azimuth of its frame [rad]; nothing is built."""
     frame = Frame.of(scene, spec)
-    given = run_arguments(scene, spec, frame, given_state(scene, spec, frame), scene.end)
+    arguments = run_arguments(scene, spec, frame, given_state(scene, spec, frame), scene.end)
     monitors = monitor_options(scene, spec.effects, scene.effect_selection, ())
-    return given._replace(options=given.options | monitors), frame.azimuth
+    return arguments._replace(options=arguments.options | monitors), frame.azimuth
 
 
 def run_arguments(

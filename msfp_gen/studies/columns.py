@@ -145,7 +145,8 @@ class Keep:
             columns_of_name = [key for key in known if key == name or re.fullmatch(rf"{re.escape(name)}_\d+", key)]
             if not columns_of_name:
                 words = sorted({re.sub(r"_\d+$", "", key) for key in known})
-                hint = suggestion(name, words) or f"; the quantities are {', '.join(words)}"
+                listed = f"the quantities are {', '.join(words)}" if words else "this system has none; give keep = []"
+                hint = suggestion(name, words) or f"; {listed}"
                 raise InputError(f"keep: {name!r} is no quantity{hint}")
             columns += [Column(key, known[key].quantity.unit, key in TEXTS) for key in columns_of_name]
         for name, text in self.formulas:

@@ -64,7 +64,7 @@ def test_a_preset_is_audited_against_itself(tmp_path, capsys):
     [
         (["out.csv", "--bearing", "no-such"], "no such file"),
         (["missing.csv", "--bearing", "fenz-test3", "--map", "map.toml"], "missing.csv"),
-        (["out.csv", "--bearing", "hospital-ccc", "--map", "map.toml"], "more than one bearing"),
+        (["out.csv", "--bearing", "hospital-ccc", "--map", "map.toml"], "not one bearing alone"),
         (["out.csv", "--bearing", "fenz-test3", "--map", "map.toml", "--page", "x.pdf"], "--page"),
     ],
 )

@@ -12,6 +12,7 @@ import pytest
 from support import ROOT
 
 import msfp_gen
+from msfp_gen.scene.system import kinds
 
 LINKED = {"generator", "templates"}  # the same folders again, under their import names
 PACKAGE = sorted(p for p in (ROOT / "msfp_gen").rglob("*.py") if not LINKED & set(p.relative_to(ROOT).parts))
@@ -156,13 +157,25 @@ CORE = (
 )  # fmt: skip
 
 
+# What imports a module that a text names, or finds one that is imported already.
+BY_TEXT = {"import_module", "__import__", "resolve_name", "runpy", "modules"}
+
+
+def loads_by_text(tree):
+    """Names and attributes of a module that load modules whose names are texts."""
+    names = ("attr", "id", "name")  # of attributes, names and imported names
+    return {getattr(node, name, "") for node in ast.walk(tree) for name in names} & BY_TEXT
+
+
 def test_the_core_imports_no_satellite():
-    """Imports in functions, for types, and of a module that a text names count."""
+    """Imports in functions, for types, of the package itself, and of a module that a text names count."""
     for name, path in MODULES.items():
         if name.count(".") and name.split(".")[1] in CORE:
-            above = [other for other in ours(path, late=True) if other.split(".")[1] not in CORE]
+            above = [other for other in ours(path, late=True) if f"{other}.".split(".")[1] not in CORE]
             assert not above, f"{name} imports {above}"
-            assert "import_module" not in ast.dump(tree_of(path)), f"{name} imports a module that a text names"
+            assert not loads_by_text(tree_of(path)), f"{name} imports a module that a text names"
+    source = "__import__(x)\nimportlib.import_module(x)\npkgutil.resolve_name(x)\nsys.modules[x]\nrunpy.run_module(x)"
+    assert loads_by_text(ast.parse(source)) == BY_TEXT
 
 
 def test_guests_import_the_core_and_the_guests_that_are_listed():
@@ -268,6 +281,9 @@ def test_few_functions_ask_for_the_kind_of_a_system():
     assert {"Scene", "BuildingScene", "Result", "BuildingResult", "History", "BuildingCharacterisation"} <= set(classes)
     found = places_outside_buildings(lambda own: asking_for({kind for kind in classes if classes[kind] != own}))
     assert set(found) == set(KIND_SWITCHES)
+    for name, path in MODULES.items():
+        texts = {node.value for node in ast.walk(tree_of(path)) if isinstance(node, ast.Constant)}
+        assert name.startswith("msfp_gen.buildings") or not texts & set(kinds()), f"{name} names a kind"
 
 
 def test_few_functions_ask_whether_a_value_has_an_attribute():

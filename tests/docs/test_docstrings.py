@@ -1,4 +1,4 @@
-"""Public docstrings state shape and unit of arrays, private ones are short; texts say the noun again, not "that of"."""
+"""Public docstrings state shape and unit of arrays, private ones are one line."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from collections.abc import Iterator
 
 from support import ROOT
 
-NOT_REPEATED = re.compile(r"\b(?:that|those) of\b|\bas of `|\bof which\b", re.IGNORECASE)
 LINKED = {"generator", "templates"}  # the same folders again, under their import names
 SOURCES = [p for p in (ROOT / "msfp_gen").rglob("*.py") if not LINKED & set(p.relative_to(ROOT).parts)]
 ARRAY = re.compile(r"\b(Array|ndarray|NDArray)\b")
@@ -134,21 +133,3 @@ def test_docstrings_of_private_functions_are_one_line() -> None:
     assert not long, long
     text = "class A:\n    def _inner(self):\n        '''One.\n\n        Two.\n        '''\n"
     assert [function.name for function in private_functions(ast.parse(text))] == ["_inner"]
-
-
-def public_docstrings(node: ast.Module | ast.ClassDef) -> Iterator[str]:
-    yield ast.get_docstring(node) or ""
-    for item in node.body:
-        if isinstance(item, ast.ClassDef) and public(item.name):
-            yield from public_docstrings(item)
-        elif isinstance(item, ast.FunctionDef) and public(item.name):
-            yield ast.get_docstring(item) or ""
-
-
-def test_pages_and_public_docstrings_say_the_noun_again() -> None:
-    pages = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/*.md*")]
-    pages += (ROOT / "examples" / "gallery").rglob("*.py")
-    texts = [(path, path.read_text("utf-8")) for path in pages if path.name != "CHANGELOG.md"]
-    texts += [(path, text) for path in SOURCES for text in public_docstrings(ast.parse(path.read_text("utf-8")))]
-    found = [(path.name, hit[0]) for path, text in texts if (hit := NOT_REPEATED.search(" ".join(text.split())))]
-    assert not found, found

@@ -12,7 +12,6 @@ from msfp_gen.scene.file.loader import scene_text
 GOOD = tomllib.loads(scene_text(presets.scene("fenz-test2")))
 ABSENT = object()
 RECORD = {"kind": "record", "bundled": "ridgecrest-2019-ci-ccc"}
-HARMONIC = {"kind": "harmonic", "amplitude": 0.1, "frequency": 0.1}
 # path, value put there (ABSENT: removed), words that the message must hold
 ROWS = [
     # unknown and misspelt keys

@@ -235,8 +235,8 @@ def prepared(
         return corrected, positive("scale", scale)
     if scale != 1:
         raise InputError(f"scale = {scale!r}: scale_to is given too; give one of them")
-    given = {name: value for name in ORDINATES if (value := getattr(scale_to, name)) is not None}
-    metadata = {**corrected.metadata, "scaled_to": str(scale_to), **given}
+    ordinates = {name: value for name in ORDINATES if (value := getattr(scale_to, name)) is not None}
+    metadata = {**corrected.metadata, "scaled_to": str(scale_to), **ordinates}
     return replace(corrected, metadata=metadata), scale_to.factor(corrected, progress)
 
 

@@ -31,7 +31,7 @@ def load_bearing_scene(source: str | Path) -> Scene:
     """The scene of one bearing in a file or preset. Raises InputError as `load_scene`, and for other systems."""
     scene = load_scene(source)
     if not isinstance(scene, Scene):
-        raise InputError(f"scene = {str(source)!r}: this has more than one bearing; give a scene of one bearing here")
+        raise InputError(f"scene = {str(source)!r}: this is not one bearing alone; give a scene of one bearing here")
     return scene
 
 

@@ -321,14 +321,14 @@ def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[
 
 def _sheet_ratios(bearing: Bearing) -> tuple[tuple[float, ...], ...]:
     """Lower, nominal and upper friction over the nominal one of every surface, where it is given. Raises InputError."""
-    given = given_friction(bearing)
+    nominal = given_friction(bearing)
     cases = []
     for name, values in (("friction_lower", bearing.friction_lower), ("friction_upper", bearing.friction_upper)):
         if values is None:
             raise InputError(f"bearing.{name} is missing: give the bounds of friction, or a table of factors")
         at = given_friction(_with_nominal(bearing, values))
-        cases.append(tuple(bound / mu if mu else 1.0 for bound, mu in zip(at, given, strict=True)))
-    return cases[0], (1.0,) * len(given), cases[1]
+        cases.append(tuple(bound / mu if mu else 1.0 for bound, mu in zip(at, nominal, strict=True)))
+    return cases[0], (1.0,) * len(nominal), cases[1]
 
 
 def _with_nominal(bearing: Bearing, friction: tuple[float, ...]) -> Bearing:

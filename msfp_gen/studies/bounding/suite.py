@@ -210,8 +210,8 @@ def suite_scenes(study: Study, leave_out: Collection[str] = ()) -> list[tuple[st
     from msfp_gen.studies.axes import SceneFactory  # which imports this package
 
     of_records, of_bounds = study.axes
-    given = {key: value for key, value in study.inputs.scene.items() if key != "fidelity"}
-    factory = SceneFactory(replace(study.inputs, scene=given, axes=(of_records,)))
+    table = {key: value for key, value in study.inputs.scene.items() if key != "fidelity"}
+    factory = SceneFactory(replace(study.inputs, scene=table, axes=(of_records,)))
     factors = study.inputs.factors[of_bounds.paths[0]]
     names = [name for name in study.inputs.records if name not in leave_out]
     with expecting(study.files):

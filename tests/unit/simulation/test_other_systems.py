@@ -13,7 +13,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from msfp_gen import InputError, Motion, Scene, Solver, load_scene, simulate, simulate_batch, study
+from msfp_gen import (
+    InputError,
+    Motion,
+    Scene,
+    Solver,
+    animate,
+    load_result,
+    load_scene,
+    simulate,
+    simulate_batch,
+    study,
+)
+from msfp_gen.auditing.histories import histories_of
 from msfp_gen.cli import main
 from msfp_gen.report import write_report
 from msfp_gen.report.frames import view
@@ -30,6 +42,7 @@ from msfp_gen.simulation.bearing_run import BearingRun, start_bearing
 from msfp_gen.studies import read_study
 from msfp_gen.studies.accuracy import simulate_within
 from msfp_gen.studies.accuracy.timed_run import errors, run_native
+from msfp_gen.studies.columns import Keep
 
 
 @dataclass(frozen=True)
@@ -94,8 +107,9 @@ class PairResult(AnyResult):
     source = "pair"
     storage = replace(
         Result.storage,
-        to_dataset=lambda result: result.half.dataset,
+        to_dataset=lambda result: result.half.dataset.assign_attrs(source="pair"),
         arrays_of=lambda result: Result.storage.arrays_of(result.half),
+        groups_of=lambda _: {},
     )
     status, message, notes, time, work, compared, curve = (
         property(attrgetter(f"half.{name}"))
@@ -180,6 +194,12 @@ def test_a_third_kind_runs_through_everything(file: Path, tmp_path: Path) -> Non
     simulate(pair, checkpoint=checkpoint)
     resumed = simulate(pair, checkpoint=checkpoint, resume=True)
     assert np.array_equal(resumed.half.history.top_force, result.half.history.top_force)
+    with pytest.raises(InputError, match=r"no result of msfp-gen"):  # its file is for other programs
+        load_result(result.save(tmp_path / "pair.nc"))
+    with pytest.raises(InputError, match="two: results of this kind have no movie; their rows are in"):
+        animate(result, tmp_path / "pair.gif")
+    with pytest.raises(InputError, match="no run of one bearing alone"):
+        histories_of(result)
     page = write_report(result, tmp_path / "pair.html").read_text(encoding="utf-8")
     assert all(words in page for words in ("triple friction pendulum", "The pair in motion", "of 2 equal bearings"))
     axes = {"load": {"sets": "pair.top.axial_load", "values": [224e3, 112e3]}}
@@ -252,6 +272,7 @@ BARE = Kind("pair", lambda *args: Bare(pair_from_table(*args).half), lambda _: i
         (("plot", "--figure", "all", "-o", "figures"), "--figure = 'all': this system has no figures; its rows are in"),
         (("plot", "-o", "p.png"), "--figure = 'overview': this system has no figures; its rows are in"),
         (("bound", "-o", "b"), "this system has no bearings that can be changed"),
+        (("fmu", "-o", "b"), "this is not one bearing alone; give a scene of one bearing here"),
     ],
 )
 def test_what_a_kind_does_not_define_is_one_line(
@@ -304,6 +325,21 @@ def test_what_it_has_not_is_one_line(file: Path) -> None:
         kinds.cache_clear()
         sys.path.remove(str(file.parent))
         load_scene(file)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plain(PairResult):
+    """A result of a kind that draws no page."""
+
+    page = AnyResult.page
+
+
+def test_a_result_without_a_page_and_a_system_without_quantities_are_one_line(file: Path, tmp_path: Path) -> None:
+    result = simulate(load_scene(file))
+    with pytest.raises(InputError, match="two: results of this kind have no report; their rows are in"):
+        write_report(Plain(result.scene, result.half, {}), tmp_path / "pair.html")
+    with pytest.raises(InputError, match=r"'peak_force' is no quantity; this system has none; give keep = \[\]"):
+        _ = Keep(names=("peak_force",), formulas=(), axes=()).columns
 
 
 def test_an_error_cannot_be_asked_without_a_tolerance(file: Path) -> None:
