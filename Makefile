@@ -74,7 +74,7 @@ fuzz: $(STAMP)
 mutants: $(STAMP)
 	$(BIN)/python tools/mutants.py --count 100 --output build/mutants.json
 
-# Figures of the pages, and all that docs/accuracy.md, effects.md and performance.md measure: two hours on a quiet machine.
+# Figures of the pages, and all that docs/accuracy.md, effects.md and performance.md measure: an hour on a quiet machine.
 figures: $(STAMP)
 	$(BIN)/python benchmarks/report_figures.py
 	$(BIN)/python docs/make_figures.py

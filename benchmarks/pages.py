@@ -4,7 +4,7 @@ Above a measured table stands a comment with its command, such as `<!-- python b
 once, and its n-th comment gets the n-th table that it prints. The day beside the command becomes today, and the line
 that begins with "Measured by" gets the machine, the version and the commit. Tables that a command prints beyond these
 are in `build/figures`, with all that it prints. docs/accuracy.md comes from its template, whose tables are measured
-first. About two hours on two cores without other load; `--page NAME` measures one page. Numbers within sentences are not
+first. An hour on two cores without other load; `--page NAME` measures one page. Numbers within sentences are not
 changed: read the pages afterwards.
 """
 
