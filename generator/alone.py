@@ -19,7 +19,7 @@ from msfp_gen.specification.layout import ModelSpec
 from . import Generated
 from .derive import Equations, derive
 from .directions import BY_VARIABLES, COLUMNS, directed
-from .drivers import LENGTHS, Printer, form_of
+from .drivers import LENGTHS, DriverPrinter, form_of
 from .emit import function
 from .interface import effects_text, environment, surface_values
 from .lower import lower
@@ -164,7 +164,7 @@ def equations_alone(spec: ModelSpec, example: Any) -> Generated:
     derivatives = [lower(program) for program in directed(BY_INPUTS, schedules, by_name, equations.blocks).values()]
     form = form_of(BY_INPUTS, schedules, derivatives)
     blocks = {use.block.name: use.block for program in programs for use in (*program.inputs, program.output) if use}
-    drivers = [Printer(alone=True).part(name, passes, by_name, [form]) for name, passes in schedules.items()]
+    drivers = [DriverPrinter(alone=True).part(name, passes, by_name, [form]) for name, passes in schedules.items()]
     names = {kind: i for i, kind in enumerate(inputs_of(spec))}
     sizes = [prod(shape) for shape in inputs_of(spec).values()]
     starts = [sum(sizes[:i]) for i in range(len(sizes))]

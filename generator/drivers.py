@@ -191,7 +191,7 @@ def schedule_context(
     forms += [form_of(BY_PARAMETERS, with_directions, kernels) for kernels in (directional,) if kernels]
     forms += [form_of(BY_ENDS, of_ends, kernels) for kernels in (by_ends,) if kernels]
     every = {**balances, **with_directions, **port}
-    moving, printer = _moving_lists(tangents, of_variables), Printer()
+    moving, printer = _moving_lists(tangents, of_variables), DriverPrinter()
     return {
         "parts": [printer.part(name, passes, programs, forms) for name, passes in every.items()],
         "directed": list(with_directions),
@@ -280,7 +280,7 @@ RECORDS = {ListStorage.PARAMETERS: "p", ListStorage.WORK: "w", ListStorage.HERE:
 
 
 @dataclass(frozen=True)
-class Printer:
+class DriverPrinter:
     """C of the drivers of a schedule.
 
     alone: without the runtime, where all blocks are one record and their derivatives another, and nothing is solved.

@@ -132,7 +132,7 @@ def test_arguments_that_a_driver_does_not_name_are_marked() -> None:
     schedule = drivers.with_variables(equations.spec.effects)
     tangents = drivers.form_of(directions.BY_VARIABLES, schedule, drivers.variable_kernels(equations))
     for name, passes in schedule.items():
-        printed = drivers.Printer().part(name, passes, programs, [tangents])
+        printed = drivers.DriverPrinter().part(name, passes, programs, [tangents])
         for form in ("values", "tangents"):
             text = " ".join(line for one in printed["passes"][form] for line in one["lines"])
             named = {*re.findall(r"\w+", text)}
