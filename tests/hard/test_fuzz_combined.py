@@ -15,6 +15,8 @@ from support import preset_run, scene_of
 
 from msfp_gen import Auto, Load, Motion, simulate
 from msfp_gen.model.compiled import named_vectors
+from msfp_gen.simulation.bearing_run import BearingRun
+from msfp_gen.simulation.system import finish
 
 
 @pytest.mark.slow
@@ -50,6 +52,18 @@ def test_the_balances_of_a_row_see_one_force_in_a_thousand() -> None:
         values = getattr(run.history, name)
         wrong = values * 1.001 if name != "contact_angles" else values + 1e-3
         assert left(replace(run.history, **{name: wrong})) > 1e-6, name
+
+
+def test_a_slider_on_its_edge_is_balanced_by_the_moment_of_its_separation() -> None:
+    """9 % of a moment were left, since the check knew neither this moment nor that the separation leaves the rim."""
+    scene = replace(fuzz_balance.turned(fuzz_combined.case(92, 101).scene), output_step=None)
+    run = BearingRun.of(scene)
+    finish(run, scene.end)
+    history = run.result().history
+    assert np.abs(history.separation).max() > 1e-3 and run.segments[-1].model.effects.uplift
+    assert fuzz_balance.worst_row(scene, run, history) < 2e-4
+    wrong = replace(history, contact_angles=history.contact_angles + 1e-3)
+    assert fuzz_balance.worst_row(scene, run, wrong) > 2e-4
 
 
 def test_half_the_longest_step_sees_a_pulse_that_was_stepped_over() -> None:
