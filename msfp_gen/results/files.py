@@ -24,7 +24,7 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.results.gradients import ERROR
 from msfp_gen.results.note import Note
 from msfp_gen.results.sign import DEFAULT, SIGNED, shown_sign, sign_of
-from msfp_gen.results.stored_group import Attribute, StoredGroup, stored_groups
+from msfp_gen.results.stored_group import Attribute, StoredGroup, file_in_memory, stored_groups
 from msfp_gen.results.variables import Arrays, Places, columns_of
 
 if TYPE_CHECKING:
@@ -74,19 +74,17 @@ def to_netcdf(result: AnyResult, path: str | Path) -> Path:
 
     Raises InputError where the suffix is not .nc or the folder does not exist.
     """
-    import h5netcdf
+    from h5netcdf import File
     from xarray.backends import H5NetCDFStore
 
     path = check_output(path, DATASET_SUFFIXES)
-    dataset = signed(result.dataset)
-    # The file is made in memory, because HDF5 crashes instead of raising an error when the disk is full.
-    content = BytesIO()
-    with h5netcdf.File(content, "w") as file:
-        dataset.dump_to_store(H5NetCDFStore(file), encoding=_encoding(dataset))
-        for name, group in result.groups.items():
-            group = signed(group)
-            group.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(group))
-    write_bytes(path, [content.getbuffer()])
+    with file_in_memory() as stored:
+        with File(stored, "w") as file:
+            for name, group in [(None, result.dataset), *result.groups.items()]:
+                content = _with_fixed_texts(signed(group))
+                content.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(content, name))
+        stored.flush()
+        write_bytes(path, [stored.id.get_file_image()])
     return path
 
 
@@ -277,16 +275,37 @@ def attributes_of(
     }
 
 
-def _encoding(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
-    """Checksums of all numbers, and compression of rows and of the pieces of a motion."""
+def _with_fixed_texts(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset whose attributes have texts of fixed length: HDF5 may loop for ever over damaged ones of another."""
+    import h5py
+
+    def fixed(value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        content = value.encode()
+        return np.array(content, h5py.string_dtype(length=max(len(content), 1)))
+
+    stored = dataset.copy()
+    for attributes in (stored.attrs, *(variable.attrs for variable in stored.variables.values())):
+        attributes.update({name: fixed(value) for name, value in attributes.items()})
+    return stored
+
+
+def _encoding(dataset: xr.Dataset, group: str | None) -> dict[Hashable, dict[str, Any]]:
+    """Checksums of all arrays, characters for texts, and compression of rows and of the pieces of a motion."""
     # The lowest compression level suffices: histories of stuck surfaces and of rims repeat most values.
     from msfp_gen.scene.file.stored_motion import COMPRESSED
 
     encoding: dict[Hashable, dict[str, Any]] = {}
     for name, values in dataset.variables.items():
-        if values.size and values.dims and values.dtype.kind in "if":
-            compressed = name in COMPRESSED or (name in dataset.data_vars and "time" in values.dims)
-            encoding[name] = {"fletcher32": True} | ({"zlib": True, "complevel": 1} if compressed else {})
+        if values.size and values.dims:
+            encoding[name] = {"fletcher32": True}
+            if values.dtype.kind not in "if":
+                # h5netcdf does not find a dimension of characters in the group above: those of groups have other names.
+                length = f"{'group_' if group else ''}{name}_characters"
+                encoding[name] |= {"dtype": "S1", "char_dim_name": length}
+            elif name in COMPRESSED or (name in dataset.data_vars and "time" in values.dims):
+                encoding[name] |= {"zlib": True, "complevel": 1}
     return encoding
 
 

@@ -2,7 +2,8 @@
 
 HDF5 follows links and external storage to other files, and allocates what a file claims. Here nothing is opened that
 lies elsewhere, and no array is read that is larger than its bytes in the file can hold. Damaged bytes are found by the
-checksums of HDF5 itself (fletcher32).
+checksums of HDF5 itself (fletcher32, and those of the description of the file since HDF5 1.8). Texts have a fixed
+length: HDF5 loops for ever over some damaged files where it looks for a text of another length.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
 
 EXPANSION = 1100  # bytes of an array over its bytes in the file, at most; deflate reaches 1032
 SMALLEST_CHUNK = 2**20  # [bytes]; a chunk, which HDF5 allocates whole, may be larger than a smaller array
-BLOCK = 256  # texts read at once
+CHECKSUM = 4  # [bytes]; of each chunk, at its end
+MOST_ATTRIBUTES = 1000  # in the header of a group
 Attribute = str | int | float
 
 
@@ -74,18 +76,16 @@ class StoredGroup:
         return 0.0 - dataset[()] if name in self._turned else dataset[()]
 
     def texts(self, name: str, count: int, words: Collection[str]) -> list[str]:
-        """A list of texts, each one of `words`."""
-        import h5py
-
-        dataset = self._dataset(name)
-        if dataset.shape != (count,) or h5py.check_string_dtype(dataset.dtype) is None:
+        """A list of texts, each one of `words`, which is stored as characters."""
+        shape = self._dataset(name).shape
+        if shape[:1] != (count,) or (len(shape) != 2 and count):
             raise ValueError(f"{name} is no list of {count} texts")
-        self._check_storage(dataset, name, compressed=True)
-        texts: list[str] = []
-        for start in range(0, count, BLOCK):  # many texts of the file can be the same long one
-            texts += dataset.asstr()[start : start + BLOCK].tolist()
-            if not set(texts[start:]) <= set(words):
-                raise ValueError(f"{name} has a word that is none of {', '.join(words)}")
+        if not count:
+            return []
+        characters = self.array(name, shape, "S1")
+        texts: list[str] = [b"".join(row).decode() for row in characters.tolist()]
+        if not set(texts) <= set(words):
+            raise ValueError(f"{name} has a word that is none of {', '.join(words)}")
         return texts
 
     def _dataset(self, name: str) -> h5py.Dataset:
@@ -112,21 +112,53 @@ class StoredGroup:
         most = stored * (EXPANSION if h5z.FILTER_DEFLATE in filters else 1)
         if stored > self._size or size > most or chunk > max(size, SMALLEST_CHUNK):
             raise ValueError(f"{name} claims {size} bytes, and the file has {stored} of them")
+        if h5z.FILTER_FLETCHER32 in filters:
+            self._check_chunks(dataset, name, 1 << filters.index(h5z.FILTER_FLETCHER32))
+
+    def _check_chunks(self, dataset: h5py.Dataset, name: str, checksum: int) -> None:
+        """Raise ValueError unless each chunk is there, with its checksum: the list of chunks has none itself.
+
+        checksum: bit of the mask of filters that a chunk goes without. HDF5 crashes where a chunk is shorter than it.
+        """
+        found, sizes = set(), list(zip(dataset.shape, dataset.chunks, strict=True))
+
+        def take(chunk: Any) -> bool | None:
+            """True, which ends the iteration, for a chunk that is not as expected."""
+            placed = all(at < n and at % size == 0 for at, (n, size) in zip(chunk.chunk_offset, sizes, strict=True))
+            found.add(chunk.chunk_offset)
+            return None if placed and chunk.size > CHECKSUM and not chunk.filter_mask & checksum else True
+
+        if dataset.id.chunk_iter(take) or len(found) < math.prod(-(-n // size) for n, size in sizes):
+            raise ValueError(f"{name} has chunks without a checksum, or lacks some")
 
     def _attribute(self, name: str) -> Attribute:
         import h5py
 
         stored = self._group.attrs.get_id(name)
-        plain = h5py.check_string_dtype(stored.dtype) is not None or stored.dtype.kind in "if"
-        if stored.shape not in ((), (1,)) or not plain or stored.get_storage_size() > self._size:
+        text = h5py.check_string_dtype(stored.dtype)
+        if text is not None and text.length is None:  # HDF5 may loop for ever where it reads one
+            raise ValueError(f"attribute {name} is a text of variable length: write it with a fixed one")
+        if stored.shape not in ((), (1,)) or stored.dtype.kind not in "ifS" or stored.get_storage_size() > self._size:
             raise ValueError(f"attribute {name} is no text and no number")
-        value = self._group.attrs[name]
-        value = value.item() if isinstance(value, np.ndarray | np.generic) else value
-        if not isinstance(value, str | int | float):
-            raise ValueError(f"attribute {name} is no text and no number")
-        if isinstance(value, str):
-            value.encode()  # h5py passes on bytes that are no text; UnicodeEncodeError is a ValueError
-        return value
+        value = np.asarray(self._group.attrs[name]).item()
+        return value.decode() if isinstance(value, bytes) else value  # UnicodeDecodeError is a ValueError
+
+
+@contextmanager
+def file_in_memory() -> Iterator[h5py.File]:
+    """A new HDF5 file, in memory: HDF5 crashes instead of raising an error when the disk is full."""
+    import h5py
+    from h5py import h5f, h5p
+
+    creation, access = h5p.create(h5p.FILE_CREATE), h5p.create(h5p.FILE_ACCESS)
+    # Attributes of the root up to 64 kB lie in its header, whose checksum is theirs.
+    creation.set_attr_phase_change(MOST_ATTRIBUTES, 0)
+    creation.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)  # netCDF-4 asks for this order
+    creation.set_attr_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
+    access.set_libver_bounds(h5f.LIBVER_V18, h5f.LIBVER_V18)  # as netCDF 4; since it, headers have checksums
+    access.set_fapl_core(backing_store=False)
+    with h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, creation, access)) as file:
+        yield file
 
 
 @contextmanager

@@ -60,7 +60,7 @@ def read(path: Path) -> object:
     from msfp_gen.cli.console import load_source
 
     result = load_source(str(path))
-    return result.dataset.drop_attrs(deep=False), result.provenance, result.status, repr(result.scene)
+    return result.dataset, result.provenance, result.status, repr(result.scene)
 
 
 def same(one: object, other: object) -> bool:

@@ -47,17 +47,24 @@ def any_dataset(file: h5py.File, dice: random.Random) -> h5py.Dataset:
     return dice.choice(found)
 
 
+def fixed(text: bytes) -> Any:
+    """A text of fixed length, as in a result."""
+    return np.array(text, h5py.string_dtype(length=max(len(text), 1)))
+
+
 def an_attribute(file: h5py.File, dice: random.Random) -> None:
     """An attribute that another type, another value or another name takes."""
     item = dice.choice([file, file, any_object(file, dice)])
     name = dice.choice(list(item.attrs) or ["scene"])
     value = item.attrs[name]
     del item.attrs[name]
-    if isinstance(value, str) and value and dice.random() < 0.5:
+    if isinstance(value, bytes) and value and dice.random() < 0.5:
         at = dice.randrange(len(value))
-        item.attrs[name] = value[:at] + dice.choice(["", "9", "e308", "'", "[", "nan", "\n", "ü"]) + value[at + 1 :]
+        other = dice.choice(["", "9", "e308", "'", "[", "nan", "\n", "ü"])
+        item.attrs[name] = fixed(value[:at] + other.encode() + value[at + 1 :])
     elif dice.random() < 0.8:
-        item.attrs[name] = dice.choice(WRONG)
+        wrong = dice.choice(WRONG)
+        item.attrs[name] = fixed(wrong.encode()) if isinstance(wrong, str) and dice.random() < 0.8 else wrong
 
 
 def nothing_there(file: h5py.File, dice: random.Random) -> None:
@@ -122,7 +129,7 @@ def other_values(file: h5py.File, dice: random.Random) -> None:
     item = any_dataset(file, dice)
     values = item[()]
     at = tuple(dice.randrange(size) for size in values.shape)
-    others: dict[str, list[Any]] = {"O": [b"x"], "f": [1e300, -1e300, 0.0, 7.0], "i": [-1, 0, 7, 2**30]}
+    others: dict[str, list[Any]] = {"S": [b"x"], "f": [1e300, -1e300, 0.0, 7.0], "i": [-1, 0, 7, 2**30]}
     values[at] = dice.choice(others[values.dtype.kind])
     item[...] = values
 

@@ -1,11 +1,7 @@
-"""Damaged result files of all kinds: the right content or one line, in a time that is bounded, and nothing printed.
-
-Arrays have the checksums of HDF5. Attributes have none: what is no text is refused, but another digit is read.
-"""
+"""Damaged result files of all kinds: the right content or one line, in a time that is bounded, and nothing printed."""
 
 from __future__ import annotations
 
-import signal
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +12,6 @@ from support.buildings import frame, scene
 from support.damaged_files import ends
 
 from msfp_gen import Motion, load_scene, simulate
-
-LOOP = f"the process ended with {-signal.SIGALRM}"
 
 
 def bearing(folder: Path) -> Path:
@@ -43,20 +37,8 @@ def gradients(folder: Path) -> Path:
     return simulate(load_scene("fenz-test2"), gradients=["bearing.friction[0]"]).to_netcdf(folder / "gradients.nc")
 
 
-def checked(found: dict[int, str]) -> Counter[str]:
-    """How often each end came; HDF5 itself may loop over damaged texts, which have no checksum."""
-    counts = Counter(found.values())
-    assert set(counts) <= {"refused", "read", LOOP}, counts
-    return counts
-
-
-@pytest.mark.slow
-def test_damage_ends_in_one_line(tmp_path: Path) -> None:
-    assert checked(ends(bearing(tmp_path), 0, 16))["refused"] > 2
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [bearing, pieces, building, gradients])
 def test_much_damage_ends_in_one_line(kind, tmp_path: Path) -> None:
-    counts = checked(ends(kind(tmp_path), 0, 60))
-    assert counts["refused"] > 15 and counts[LOOP] < 6
+    counts = Counter(ends(kind(tmp_path), 0, 60).values())
+    assert set(counts) == {"refused", "read"} and counts["refused"] > 15, counts

@@ -60,7 +60,7 @@ def noise(content: bytes, dice: random.Random) -> bytes:
 @pytest.mark.parametrize("count", COUNTS)
 def test_damage_is_refused_or_does_not_matter(saved: Path, tmp_path: Path, count: int) -> None:
     whole, expected, ends = saved.read_bytes(), load_result(saved), set()
-    path, texts = tmp_path / "damaged.nc", 0
+    path = tmp_path / "damaged.nc"
     for seed in range(count):
         dice, content = random.Random(seed), whole
         for _ in range(dice.choice([1, 1, 3, 20])):
@@ -72,13 +72,11 @@ def test_damage_is_refused_or_does_not_matter(saved: Path, tmp_path: Path, count
             ends.add("refused")
         else:
             ends.add("read")
-            # HDF5 has checksums of the numbers and none of texts (docs/robustness.md): one in 5,000 differs in a digit
-            assert found.dataset.equals(expected.dataset), seed
-            texts += not found.dataset.identical(expected.dataset) or found.scene != expected.scene
-    assert ends == {"refused", "read"} and texts <= count / 1000
+            assert found.dataset.identical(expected.dataset) and found.scene == expected.scene, seed
+    assert ends == {"refused", "read"}
 
 
-@pytest.mark.parametrize("count", [12, pytest.param(5000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [12, pytest.param(2000, marks=pytest.mark.slow)])
 @pytest.mark.filterwarnings("ignore:overflow encountered in cast")
 def test_forged_content_is_refused_or_is_a_result(copy: Path, saved: Path, tmp_path: Path, count: int) -> None:
     ends = set()
@@ -92,7 +90,7 @@ def test_forged_content_is_refused_or_is_a_result(copy: Path, saved: Path, tmp_p
             continue
         ends.add("read")
         assert found.summary and repr(found) and found.dataset and all(note.line for note in found.notes)
-        if seed % 5:
+        if seed % 25:
             continue
         found.to_netcdf(tmp_path / "again.nc")
         assert load_result(tmp_path / "again.nc").dataset.identical(found.dataset), (seed, done)
@@ -108,9 +106,9 @@ def test_a_result_opens_no_file_of_the_user(kind: str, tmp_path: Path) -> None:
     secret.write_text("time [s], u1 [m]\n" + "".join(f"{0.1 * i}, {1e-4 * i * i}\n" for i in range(60)))
     path = preset_run("fenz-test2").to_netcdf(tmp_path / "run.nc")
     with h5py.File(path, "r+") as file:
-        head, _, tail = str(file.attrs["scene"]).partition("[motion]")
+        head, _, tail = file.attrs["scene"].decode().partition("[motion]")
         after = tail[tail.index("\n[") :]
-        file.attrs["scene"] = f"{head}[motion]\nkind = {kind!r}\nfile = {str(secret)!r}\n{after}"
+        file.attrs["scene"] = np.bytes_(f"{head}[motion]\nkind = {kind!r}\nfile = {str(secret)!r}\n{after}")
     assert "motion.file = " in refusal(path) and "a result opens no other file" in refusal(path)
 
 
@@ -176,19 +174,62 @@ def test_a_changed_byte_of_the_rows_is_found_by_hdf5(copy: Path) -> None:
     assert "no netCDF-4 file that can be read" in refusal(copy)
 
 
-def test_all_numbers_have_checksums(copy: Path) -> None:
+def test_all_arrays_have_checksums(copy: Path) -> None:
+    """Numbers and characters; a dimension without coordinate, as an object of HDF5, has no values."""
+
     def without(_: str, item: h5py.Dataset | h5py.Group) -> str | None:
-        numbers = isinstance(item, h5py.Dataset) and item.size and item.shape and item.dtype.kind in "if"
-        return item.name if numbers and not item.fletcher32 and not item.is_scale else None
+        stored = isinstance(item, h5py.Dataset) and item.id.get_storage_size()
+        assert not stored or item.dtype.kind in "ifS"
+        return item.name if stored and not item.fletcher32 else None
 
     with h5py.File(copy) as file:
-        assert file["time"].fletcher32 and file.visititems(without) is None
+        assert file["time"].fletcher32 and file["axis"].fletcher32 and file.visititems(without) is None
+
+
+def test_a_changed_byte_of_a_text_is_found_by_hdf5(copy: Path) -> None:
+    whole = copy.read_bytes()
+    for word in (b'name = "fenz-test2"', b'{"displacement": ['):
+        content = bytearray(whole)
+        content[content.index(word) + 9] ^= 1
+        copy.write_bytes(content)
+        assert "incorrect metadata checksum" in refusal(copy)
+
+
+def test_texts_of_variable_length_are_refused(copy: Path) -> None:
+    """HDF5 may loop for ever over damaged ones."""
+    with h5py.File(copy, "r+") as file:
+        file.attrs["message"] = "h5py writes a text so"
+    assert "attribute message is a text of variable length: write it with a fixed one" in refusal(copy)
+
+
+def test_long_texts_are_kept(tmp_path: Path) -> None:
+    """Attributes that no header has room for."""
+    result = replace(preset_run("fenz-test2"), message="ü" * 50000)
+    assert load_result(result.to_netcdf(tmp_path / "long.nc")).message == result.message
+
+
+@pytest.mark.parametrize("damage", ["short", "unchecked", "missing"])
+def test_lists_of_chunks_are_checked(damage: str, copy: Path) -> None:
+    """HDF5 crashes on a chunk that is shorter than its checksum, and reads zeros for one that is missing."""
+    with h5py.File(copy, "r+") as file:
+        array = file["gap"]
+        values = array[()]
+        if damage == "short":
+            array.id.write_direct_chunk((0, 0), b"123")
+        elif damage == "unchecked":
+            array.id.write_direct_chunk((0, 0), values.tobytes(), filter_mask=0b111)
+        else:
+            del file["gap"]
+            chunks = (len(values) // 2 + 1, values.shape[1])
+            array = file.create_dataset("gap", values.shape, chunks=chunks, dtype=float, fletcher32=True, compression=1)
+            array[: chunks[0]] = values[: chunks[0]]
+    assert "gap has chunks without a checksum, or lacks some" in refusal(copy)
 
 
 def test_a_file_of_another_version_that_cannot_be_read_says_so(copy: Path) -> None:
     """A file that can be read is read; one that lacks a variable is not called damaged."""
     with h5py.File(copy, "r+") as file:
-        file.attrs["edition"] = "0" * 12
+        file.attrs["edition"] = np.bytes_("0" * 12)
     assert load_result(copy).status == "ok"
     with h5py.File(copy, "r+") as file:
         del file["gap"]
@@ -214,7 +255,7 @@ def test_the_event_of_a_stop_is_of_no_surface(tmp_path: Path) -> None:
 
 def test_a_command_says_it_in_one_line(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with h5py.File(copy, "r+") as file:
-        file.attrs["counter_steps"] = "many"
+        file.attrs["counter_steps"] = np.bytes_("many")
     assert main(["characterise", str(copy)]) == 2
     error = capsys.readouterr().err
     assert error.startswith("error: path = ") and error.count("\n") == 1 and "counter_steps is no count" in error
@@ -228,6 +269,6 @@ def test_each_field_of_a_note_is_checked(copy: Path, field: str) -> None:
     for given, valid in ((note, True), ({**note, field: wrong}, False)):
         text = json.dumps([given]).replace("Infinity", "1e999")
         with h5py.File(copy, "r+") as file:
-            file.attrs["notes"] = text
+            file.attrs["notes"] = np.bytes_(text)
         with pytest.raises(InputError, match="damaged") if not valid else nullcontext():
             assert load_result(copy)

@@ -157,7 +157,7 @@ def test_a_file_holds_the_gradients(energies: bool, tmp_path: Path) -> None:
 def test_a_file_with_damaged_parameters_is_refused(parameters: str, tmp_path: Path) -> None:
     path = result().to_netcdf(tmp_path / "run.nc")
     with h5py.File(path, "a") as file:
-        file["gradient"].attrs["parameters"] = parameters
+        file["gradient"].attrs["parameters"] = np.bytes_(parameters)
     with pytest.raises(InputError, match="give a file that `run -o` wrote"):
         load_result(path)
 
