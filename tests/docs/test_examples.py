@@ -176,8 +176,8 @@ CHECKS: dict[str, dict[str, Any]] = {
 )
 def test_an_example_of_the_gallery_computes_what_is_known(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     text = GALLERY[name].read_text(encoding="utf-8")
-    for library in re.findall(r"^(?:from|import) (SALib|pymoo|openseespy)", text, re.MULTILINE):
-        pytest.importorskip(library)
+    for library in re.findall(r"^(?:from|import) ((?:SALib|pymoo|openseespy)\S*)", text, re.MULTILINE):
+        pytest.importorskip(library, exc_type=Exception)  # openseespy raises RuntimeError without libblas3
     pyplot = pytest.importorskip("matplotlib.pyplot")
     pyplot.switch_backend("agg")
     monkeypatch.chdir(GALLERY[name].parent)
