@@ -137,7 +137,7 @@ class StoredGroup:
         stored = self._group.attrs.get_id(name)
         text = h5py.check_string_dtype(stored.dtype)
         if text is not None and text.length is None:  # HDF5 may loop for ever where it reads one
-            raise ValueError(f"attribute {name} is a text of variable length: write it with a fixed one")
+            raise ValueError(f"attribute {name} is a text of variable length, of an older version or another program")
         if stored.shape not in ((), (1,)) or stored.dtype.kind not in "ifS" or stored.get_storage_size() > self._size:
             raise ValueError(f"attribute {name} is no text and no number")
         value = np.asarray(self._group.attrs[name]).item()

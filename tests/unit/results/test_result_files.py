@@ -199,7 +199,7 @@ def test_texts_of_variable_length_are_refused(copy: Path) -> None:
     """HDF5 may loop for ever over damaged ones."""
     with h5py.File(copy, "r+") as file:
         file.attrs["message"] = "h5py writes a text so"
-    assert "attribute message is a text of variable length: write it with a fixed one" in refusal(copy)
+    assert "attribute message is a text of variable length, of an older version or another program" in refusal(copy)
 
 
 def test_long_texts_are_kept(tmp_path: Path) -> None:
