@@ -6,6 +6,7 @@ it. OpenSees keeps its model in the process.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
@@ -19,11 +20,11 @@ YIELD, STIFF, LEAST, TOLERANCE = 1e-3, 1e10, 0.1, 1e-5  # [m], [N/m], [N], relat
 
 
 def opensees() -> Any:
-    """The module of OpenSeesPy, under either of its names. Raises ImportError without it."""
-    try:
-        return import_module("openseespy.opensees")
-    except ImportError:
-        return import_module("openseespylinux.opensees")
+    """The module of OpenSeesPy, under either of its names. Raises ImportError where neither can be loaded."""
+    for name in ("openseespy.opensees", "openseespylinux.opensees"):
+        with suppress(ImportError, RuntimeError):  # RuntimeError: a library of the system is missing, as libblas3
+            return import_module(name)
+    raise ImportError("OpenSeesPy is not installed, or a library that it needs, such as libblas3")
 
 
 def cycle(sheet: Sheet, bearing: Bearing, displacement: float) -> tuple[np.ndarray, np.ndarray]:

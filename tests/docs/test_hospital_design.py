@@ -48,6 +48,17 @@ def test_building_is_that_of_the_page(design: ModuleType) -> None:
     assert len(suite["records"]) == 11 and suite["scale_to"]["between"] == [1.5, 4.5]
 
 
+def test_opensees_that_lacks_a_library_is_left_out(design: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    """OpenSeesPy raises RuntimeError where a library of the system is missing."""
+
+    def broken(name: str) -> ModuleType:
+        raise RuntimeError(f"Failed to import {name}.")
+
+    monkeypatch.setattr("opensees_cycle.import_module", broken)
+    text = design.checks()
+    assert "by hand" in text and "by a run" in text and "by OpenSees" not in text
+
+
 def test_checks_by_hand_are_on_the_page(design: ModuleType) -> None:
     """Stiffness by hand again from the numbers of the page; three lines as printed, the fourth with OpenSees."""
     length, inner = 2.235 - 0.178, 0.406 - 0.045
