@@ -116,10 +116,8 @@ class StoredGroup:
             self._check_chunks(dataset, name, 1 << filters.index(h5z.FILTER_FLETCHER32))
 
     def _check_chunks(self, dataset: h5py.Dataset, name: str, checksum: int) -> None:
-        """Raise ValueError unless each chunk is there, with its checksum: the list of chunks has none itself.
-
-        checksum: bit of the mask of filters that a chunk goes without. HDF5 crashes where a chunk is shorter than it.
-        """
+        """Raise ValueError unless each chunk is there, with the filter of this bit of its mask."""
+        # The list of chunks has no checksum itself, and HDF5 crashes where a chunk is shorter than its checksum.
         found, sizes = set(), list(zip(dataset.shape, dataset.chunks, strict=True))
 
         def take(chunk: Any) -> bool | None:
