@@ -74,8 +74,16 @@ def start(tmp_path_factory):
 @pytest.fixture(scope="module")
 def browser(start, page):
     opened = start()
-    opened.get(page.as_uri())
+    show(opened, page)
     return opened
+
+
+def show(browser, page):
+    """Open the page and wait until its scripts have ended: the driver may return before, on a busy machine."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    browser.get(page.as_uri())
+    WebDriverWait(browser, 60).until(lambda opened: js(opened, "return document.documentElement.dataset.ready"))
 
 
 def js(browser, code, *arguments):
@@ -112,7 +120,7 @@ def test_it_loads_offline_without_a_word_in_the_console(browser, page):
 
 def test_it_opens_at_the_peak_and_plays_from_the_start(start, page, saved):
     browser = start()
-    browser.get(page.as_uri())
+    show(browser, page)
     u = load_result(saved).history.displacement[:, :2]
     shown = js(browser, "return [...at('displacement', current)].slice(0, 2)")
     assert np.hypot(*shown) == pytest.approx(np.hypot(*u.T).max(), rel=2e-3)
@@ -265,7 +273,7 @@ def test_it_prints(browser):
 @pytest.mark.slow
 def test_without_webgl_it_says_so_and_draws_from_the_side(start, page):
     plain = start("--disable-3d-apis")
-    plain.get(page.as_uri())
+    show(plain, page)
     assert "no WebGL" in plain.find_element("id", "scene").text
     before = js(plain, "return document.querySelector('#section svg g').innerHTML")
     move(plain, 60)
