@@ -116,8 +116,9 @@ class StoredGroup:
             self._check_chunks(dataset, name, 1 << filters.index(h5z.FILTER_FLETCHER32))
 
     def _check_chunks(self, dataset: h5py.Dataset, name: str, checksum: int) -> None:
-        """Raise ValueError unless each chunk is there, with the filter of this bit of its mask."""
+        """Raise ValueError unless each chunk is there, with its checksum."""
         # The list of chunks has no checksum itself, and HDF5 crashes where a chunk is shorter than its checksum.
+        # checksum: the bit of a chunk's filter mask that HDF5 sets where the chunk was written without one.
         found, sizes = set(), list(zip(dataset.shape, dataset.chunks, strict=True))
 
         def take(chunk: Any) -> bool | None:

@@ -114,7 +114,6 @@ def complaints(browser):
 
 
 def test_it_loads_offline_without_a_word_in_the_console(browser, page):
-    assert js(browser, "return document.documentElement.dataset.ready") == "true"
     assert complaints(browser) == []
     sent = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
     urls = [m["params"]["request"]["url"] for m in sent if m["method"] == "Network.requestWillBeSent"]
